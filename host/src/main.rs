@@ -1,0 +1,3 @@
+//! The program `sohle`.
+
+fn main() {}

@@ -1,0 +1,19 @@
+//! What the shoe and the laptop share: from an inertial sample to a [`Step`](step::Step).
+//!
+//! A sensor on the shoe is at rest for a moment in every stride. The [`Tracker`](tracker::Tracker) finds these stances,
+//! integrates the strides between them, corrects the integration with what is known of a standing foot, and hands out
+//! one [`Step`](step::Step) at the end of each stance. The same code runs on the microcontroller and, against recorded
+//! walks, on a PC; it gives the same bits on both.
+//!
+//! * [`time`], [`sample`], [`step`]: the data, as types with units.
+//! * [`so3`]: rotations.
+//! * [`stance`]: detectors of the standing foot.
+//! * [`filter`]: the unscented filter as documented, and the project's own.
+//! * [`tracker`]: all of it together.
+//!
+//! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
+#![no_std]
+
+pub mod sample;
+pub mod step;
+pub mod time;
