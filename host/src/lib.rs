@@ -1,1 +1,3 @@
-//! The laptop's side of Sohle.
+//! The laptop's side of Sohle: recordings, simulation, tracks, scores.
+
+pub mod track;

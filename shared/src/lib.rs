@@ -5,11 +5,7 @@
 //! one [`Step`](step::Step) at the end of each stance. The same code runs on the microcontroller and, against recorded
 //! walks, on a PC; it gives the same bits on both.
 //!
-//! * [`time`], [`sample`], [`step`]: the data, as types with units.
-//! * [`so3`]: rotations.
-//! * [`stance`]: detectors of the standing foot.
-//! * [`filter`]: the unscented filter as documented, and the project's own.
-//! * [`tracker`]: all of it together.
+//! The data are types with units: [`time`], [`sample`] and [`step`]. Everything comes together in [`tracker`].
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]
@@ -17,3 +13,4 @@
 pub mod sample;
 pub mod step;
 pub mod time;
+pub mod tracker;

@@ -1,0 +1,99 @@
+//! A walk as it was tracked: the steps put end to end.
+//!
+//! This is the dead-reckoned track, before any building, graph or fix corrects it.
+
+use sohle_shared::sample::ImuSample;
+use sohle_shared::step::Step;
+use sohle_shared::time::Micros;
+use sohle_shared::tracker::{Counters, Parameters, Tracker};
+
+/// A stance and where it was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stance {
+    /// First moment the foot stood.
+    pub start: Micros,
+    /// Last moment.
+    pub end: Micros,
+    /// Where. **Units:** m; **Frame:** world, z up, origin and heading of the first stance.
+    pub position: [f64; 3],
+    /// Heading of the foot. **Units:** rad, not wrapped; **Frame:** as the position.
+    pub heading: f64,
+}
+
+/// Where the foot was at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathPoint {
+    /// When.
+    pub time: Micros,
+    /// Where. **Units:** m; **Frame:** as [`Stance::position`].
+    pub position: [f64; 3],
+}
+
+/// A tracked walk.
+#[derive(Clone, Debug, Default)]
+pub struct Track {
+    /// The steps, in order; the first has index 0 and marks the start.
+    pub steps: Vec<Step>,
+    /// One stance for each step.
+    pub stances: Vec<Stance>,
+    /// The foot between the stances too, thinned to [`PATH_PERIOD_US`].
+    pub path: Vec<PathPoint>,
+    /// What was unusual.
+    pub counters: Counters,
+    /// First and last sample.
+    pub span: Option<(Micros, Micros)>,
+}
+
+/// Spacing of [`Track::path`]. **Units:** microseconds.
+pub const PATH_PERIOD_US: i64 = 10_000;
+
+impl Track {
+    /// Feeds `samples` through a tracker.
+    pub fn of(samples: impl IntoIterator<Item = ImuSample>, parameters: &Parameters) -> Self {
+        let mut tracker = Tracker::new(parameters);
+        let mut track = Self::default();
+        let mut due = None;
+        for sample in samples {
+            let output = tracker.push(&sample);
+            track.span = Some((track.span.map_or(sample.time, |(first, _)| first), sample.time));
+            if let Some(step) = output.step {
+                track.add(step);
+            }
+            if due.is_none_or(|due| sample.time >= due) {
+                track.path.push(PathPoint { time: sample.time, position: tracker.position() });
+                due = Some(sample.time + PATH_PERIOD_US);
+            }
+        }
+        if let Some(step) = tracker.finish() {
+            track.add(step);
+        }
+        track.counters = *tracker.counters();
+        track
+    }
+
+    /// Appends a step to the end of the track.
+    pub fn add(&mut self, step: Step) {
+        let last = self.stances.last();
+        let heading = last.map_or(0.0, |stance| stance.heading);
+        let origin = last.map_or([0.0; 3], |stance| stance.position);
+        let (sin, cos) = heading.sin_cos();
+        let [x, y, z] = [0, 1, 2].map(|axis| f64::from(step.displacement[axis]));
+        self.stances.push(Stance {
+            start: step.stance_start,
+            end: step.stance_end,
+            position: [origin[0] + cos * x - sin * y, origin[1] + sin * x + cos * y, origin[2] + z],
+            heading: heading + f64::from(step.turn),
+        });
+        self.steps.push(step);
+    }
+
+    /// Strides walked: the start is not one.
+    pub fn strides(&self) -> usize {
+        self.steps.len().saturating_sub(1)
+    }
+
+    /// Horizontal length of the track. **Units:** m.
+    pub fn distance(&self) -> f64 {
+        self.steps.iter().map(|step| f64::from(step.length())).sum()
+    }
+}
