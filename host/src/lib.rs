@@ -1,3 +1,4 @@
 //! The laptop's side of Sohle: recordings, simulation, tracks, scores.
 
+pub mod cli;
 pub mod track;

@@ -1,3 +1,7 @@
-//! The program `sohle`.
+//! The program `sohle`. Everything it does is in [`sohle::cli`].
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    sohle::cli::main(std::env::args_os())
+}
