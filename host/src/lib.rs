@@ -1,4 +1,5 @@
 //! The laptop's side of Sohle: recordings, simulation, tracks, scores.
 
 pub mod cli;
+pub mod recording;
 pub mod track;
