@@ -2,4 +2,5 @@
 
 pub mod cli;
 pub mod recording;
+pub mod export;
 pub mod track;
