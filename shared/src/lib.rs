@@ -5,8 +5,8 @@
 //! one [`Step`](step::Step) at the end of each stance. The same code runs on the microcontroller and, against recorded
 //! walks, on a PC; it gives the same bits on both.
 //!
-//! The data are types with units: [`time`], [`sample`] and [`step`]. Rotations are in [`so3`]. Everything comes together in
-//! [`tracker`].
+//! The data are types with units: [`time`], [`sample`] and [`step`]. Rotations are in [`so3`], the detectors that tell
+//! when the foot stands in [`stance`]. Everything comes together in [`tracker`].
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]
@@ -16,6 +16,7 @@ extern crate std;
 
 pub mod sample;
 pub mod so3;
+pub mod stance;
 pub mod step;
 pub mod time;
 pub mod tracker;
