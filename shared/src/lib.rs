@@ -14,6 +14,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod preintegration;
 pub mod sample;
 pub mod so3;
 pub mod stance;

@@ -48,9 +48,23 @@ pub struct GyroCorrected(pub Vector3<f32>);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroBias(pub Vector3<f32>);
 
-/// What is wrong with an accelerometer at rest: one factor on its magnitude. **Units:** 1.
+/// Accelerometer bias. **Units:** m/s²; **Frame:** sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AccelScale(pub f32);
+pub struct AccelBias(pub Vector3<f32>);
+
+impl GyroBias {
+    /// No bias.
+    pub fn zero() -> Self {
+        Self(Vector3::zeros())
+    }
+}
+
+impl AccelBias {
+    /// No bias.
+    pub fn zero() -> Self {
+        Self(Vector3::zeros())
+    }
+}
 
 impl Gyro {
     /// Takes the bias out.
@@ -60,9 +74,9 @@ impl Gyro {
 }
 
 impl Accel {
-    /// Divides by the scale found at rest.
-    pub fn corrected(self, scale: AccelScale) -> AccelCorrected {
-        AccelCorrected(self.0 / scale.0)
+    /// Takes the bias out.
+    pub fn corrected(self, bias: AccelBias) -> AccelCorrected {
+        AccelCorrected(self.0 - bias.0)
     }
 }
 
