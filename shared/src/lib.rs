@@ -6,7 +6,7 @@
 //! walks, on a PC; it gives the same bits on both.
 //!
 //! The data are types with units: [`time`], [`sample`] and [`step`]. Rotations are in [`so3`], the detectors that tell
-//! when the foot stands in [`stance`]. Everything comes together in [`tracker`].
+//! when the foot stands in [`stance`]. Everything comes together in [`tracker`]; [`selftest`] proves that a processor computes it as every other does.
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]
@@ -16,6 +16,7 @@ extern crate std;
 
 pub mod preintegration;
 pub mod sample;
+pub mod selftest;
 pub mod so3;
 pub mod stance;
 pub mod step;
