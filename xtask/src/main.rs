@@ -1,2 +1,62 @@
-//! The project's own commands.
-fn main() {}
+//! The project's own commands, beyond what cargo has: `cargo xtask --help` lists them.
+
+mod check;
+mod ci;
+mod device;
+mod emulator;
+mod process;
+mod stage;
+mod tools;
+
+use clap::{Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// The project's own commands.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Runs every check that a change must pass; `.ci/run` calls this.
+    Ci(ci::Arguments),
+    /// Builds `sohle-shared` without std for the microcontroller, with and without serde.
+    Device,
+    /// Runs the tracker on an emulated Cortex-M4F: the bits must be the host's; prints its cost.
+    Emulator,
+    /// Checks what is committed: no data, licences of the dependencies, the changelog.
+    Check,
+    /// Installs the Debian packages that the other commands need and that are missing.
+    Install,
+}
+
+/// The root of the checkout.
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask/ lies in the root of the checkout")
+}
+
+/// A path inside the checkout.
+fn in_root(path: &str) -> PathBuf {
+    root().join(path)
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Ci(arguments) => return if ci::run(&arguments) { ExitCode::SUCCESS } else { ExitCode::FAILURE },
+        Command::Device => device::build_shared(),
+        Command::Emulator => emulator::run(),
+        Command::Check => check::run(),
+        Command::Install => tools::install(&tools::ALL),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::FAILURE
+        }
+    }
+}

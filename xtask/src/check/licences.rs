@@ -1,0 +1,103 @@
+//! The licences of everything the project links or builds with must be ones it can pass on.
+
+use super::MANIFESTS;
+use crate::in_root;
+use crate::process::{self, Failure};
+use serde::Deserialize;
+use spdx::{Expression, ParseMode};
+use std::path::Path;
+
+/// Licences that ask for no more than a notice, or (MPL) for the source of the library's own files.
+const ALLOWED: [&str; 16] = [
+    "0BSD",
+    "Apache-2.0",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "BSL-1.0",
+    "CC0-1.0",
+    "CDLA-Permissive-2.0",
+    "ISC",
+    "MIT",
+    "MIT-0",
+    "MPL-2.0",
+    "OFL-1.1",
+    "Ubuntu-font-1.0",
+    "Unicode-3.0",
+    "Unlicense",
+    "Zlib",
+];
+
+#[derive(Deserialize)]
+struct Metadata {
+    packages: Vec<Package>,
+}
+
+#[derive(Deserialize)]
+struct Package {
+    name: String,
+    version: String,
+    license: Option<String>,
+}
+
+/// Checks every package of every lock file, for all targets and features.
+pub fn run() -> Result<(), Failure> {
+    let mut objections = Vec::new();
+    let mut count = 0;
+    for manifest in MANIFESTS {
+        for package in packages(&in_root(manifest))? {
+            count += 1;
+            objections.extend(objection(&package));
+        }
+    }
+    objections.sort();
+    objections.dedup();
+    if objections.is_empty() {
+        println!("{count} packages, all under licences that can be passed on");
+        return Ok(());
+    }
+    Err(Failure::Found(objections.join("; ")))
+}
+
+fn packages(manifest: &Path) -> Result<Vec<Package>, Failure> {
+    let mut command = process::cargo();
+    command.args(["metadata", "--locked", "--all-features", "--format-version", "1", "--manifest-path"]).arg(manifest);
+    let said = process::read(&mut command)?;
+    let metadata: Metadata =
+        serde_json::from_str(&said.out).map_err(|error| Failure::Found(format!("cargo metadata: {error}")))?;
+    Ok(metadata.packages)
+}
+
+fn objection(package: &Package) -> Option<String> {
+    let Package { name, version, license } = package;
+    let Some(text) = license else { return Some(format!("{name} {version} names no licence")) };
+    // Older packages write `MIT/Apache-2.0`.
+    let mode = ParseMode { allow_slash_as_or_operator: true, ..ParseMode::STRICT };
+    let Ok(expression) = Expression::parse_mode(text, mode) else {
+        return Some(format!("{name} {version}: `{text}` is not a licence expression"));
+    };
+    let allowed = expression.evaluate(|needed| needed.license.id().is_some_and(|id| ALLOWED.contains(&id.name)));
+    if allowed { None } else { Some(format!("{name} {version} is under {text}")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judge(license: Option<&str>) -> Option<String> {
+        objection(&Package { name: "it".into(), version: "1.0.0".into(), license: license.map(str::to_owned) })
+    }
+
+    #[test]
+    fn a_choice_needs_one_allowed_licence_and_a_sum_needs_all() {
+        assert_eq!(judge(Some("MIT/Apache-2.0")), None);
+        assert_eq!(judge(Some("MIT OR LGPL-2.1-or-later")), None);
+        assert_eq!(judge(Some("(MIT OR Apache-2.0) AND OFL-1.1")), None);
+        assert_eq!(judge(Some("MIT AND GPL-3.0-only")).as_deref(), Some("it 1.0.0 is under MIT AND GPL-3.0-only"));
+    }
+
+    #[test]
+    fn no_licence_and_no_expression_are_refused() {
+        assert_eq!(judge(None).as_deref(), Some("it 1.0.0 names no licence"));
+        assert!(judge(Some("do what you like")).is_some_and(|text| text.contains("not a licence expression")));
+    }
+}

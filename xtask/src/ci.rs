@@ -1,0 +1,65 @@
+//! Every check that a change must pass, in stages.
+
+use crate::process::{self, Failure};
+use crate::stage::{Run, Tally};
+use crate::{check, device, emulator, tools};
+use std::process::Command;
+
+/// How to run the checks.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Install missing Debian packages first; so does CI=true in the environment.
+    #[arg(long)]
+    install: bool,
+}
+
+/// Runs all stages and prints what came of them. Whether everything passed.
+pub fn run(arguments: &Arguments) -> bool {
+    let mut run = Run::default();
+    if arguments.install || std::env::var("CI").is_ok_and(|value| value == "true") {
+        run.check("install", || tools::install(&tools::ALL));
+    }
+    run.check("format", format);
+    run.check("committed files", check::run);
+    run.check("lint", || process::run(&mut cargo("clippy --locked --workspace --all-targets -- -D warnings")));
+    run.check("documentation", || {
+        process::run(cargo("doc --locked --workspace --no-deps").env("RUSTDOCFLAGS", "-D warnings"))
+    });
+    run.stage("tests", tests);
+    run.stage("documentation tests", || counted(cargo("test --locked --workspace --doc")));
+    run.check("no_std build", device::build_shared);
+    run.check("bits on a Cortex-M4F", emulator::run);
+    run.summary()
+}
+
+/// A cargo command from its words.
+fn cargo(words: &str) -> Command {
+    let mut command = process::cargo();
+    command.args(words.split(' '));
+    command
+}
+
+fn format() -> Result<(), Failure> {
+    for manifest in check::MANIFESTS {
+        process::run(cargo("fmt --all --check --manifest-path").arg(manifest))?;
+    }
+    Ok(())
+}
+
+fn tests() -> (Tally, Result<(), Failure>) {
+    let nextest = process::read(&mut cargo("nextest --version")).is_ok();
+    let words = if nextest {
+        "nextest run --locked --workspace --no-fail-fast"
+    } else {
+        "test --locked --workspace --all-targets --no-fail-fast"
+    };
+    counted(cargo(words))
+}
+
+fn counted(mut command: Command) -> (Tally, Result<(), Failure>) {
+    let (said, result) = process::show_and_read(&mut command);
+    // nextest writes its summary to standard error, the standard harness to standard output.
+    let mut tally = Tally::of_test_output(&said.out);
+    tally += Tally::of_test_output(&said.err);
+    (tally, result)
+}

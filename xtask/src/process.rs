@@ -1,0 +1,207 @@
+//! Running other programs: what was run, what it said, and how it ended.
+
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Why a command of the project stopped, in one line.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// A program could not be started.
+    #[error("cannot start `{program}`: {source}")]
+    NotStarted {
+        /// What was to run.
+        program: String,
+        /// Why it did not.
+        source: std::io::Error,
+    },
+    /// A program ended badly.
+    #[error("`{command}` ended with {status}")]
+    Ended {
+        /// What ran.
+        command: String,
+        /// Its exit status in words.
+        status: String,
+    },
+    /// Something of the machine is missing.
+    #[error("missing {what}; install with: {how}")]
+    Missing {
+        /// What is missing.
+        what: String,
+        /// The command that installs it.
+        how: String,
+    },
+    /// A file could not be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// Which.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A check found something that must not be.
+    #[error("{0}")]
+    Found(String),
+}
+
+/// What a program wrote, standard output and standard error in the order of arrival per stream.
+pub struct Said {
+    /// Standard output.
+    pub out: String,
+    /// Standard error.
+    pub err: String,
+}
+
+/// The cargo that runs this program, or the one on the PATH.
+pub fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(crate::root());
+    command
+}
+
+/// A program and its arguments in the root of the checkout.
+pub fn program<S: AsRef<OsStr>>(name: &str, arguments: impl IntoIterator<Item = S>) -> Command {
+    let mut command = Command::new(name);
+    command.current_dir(crate::root()).args(arguments);
+    command
+}
+
+/// The command as one would type it.
+pub fn typed(command: &Command) -> String {
+    let name = std::path::Path::new(command.get_program()).file_name().unwrap_or(command.get_program());
+    let words = std::iter::once(name).chain(command.get_args());
+    words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")
+}
+
+/// Runs a command on this terminal.
+pub fn run(command: &mut Command) -> Result<(), Failure> {
+    let status = command.status().map_err(|source| not_started(command, source))?;
+    if status.success() { Ok(()) } else { Err(ended(command, &status.to_string())) }
+}
+
+/// Runs a command silently. Its output is shown only when it fails.
+pub fn read(command: &mut Command) -> Result<Said, Failure> {
+    let output = command.stdin(Stdio::null()).output().map_err(|source| not_started(command, source))?;
+    let said = Said {
+        out: String::from_utf8_lossy(&output.stdout).into_owned(),
+        err: String::from_utf8_lossy(&output.stderr).into_owned(),
+    };
+    if output.status.success() {
+        return Ok(said);
+    }
+    eprint!("{}{}", said.out, said.err);
+    Err(ended(command, &output.status.to_string()))
+}
+
+/// Runs a command with its output shown as it comes and kept. The output is returned also when the command failed.
+pub fn show_and_read(command: &mut Command) -> (Said, Result<(), Failure>) {
+    let nothing = Said { out: String::new(), err: String::new() };
+    let started = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let mut child = match started {
+        Ok(child) => child,
+        Err(source) => return (nothing, Err(not_started(command, source))),
+    };
+    let (out, err) = (child.stdout.take(), child.stderr.take());
+    let said = thread::scope(|scope| {
+        let err = scope.spawn(move || err.map(|pipe| copy(pipe, std::io::stderr())).unwrap_or_default());
+        let out = out.map(|pipe| copy(pipe, std::io::stdout())).unwrap_or_default();
+        Said { out, err: err.join().unwrap_or_default() }
+    });
+    let result = match child.wait() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(ended(command, &status.to_string())),
+        Err(source) => Err(not_started(command, source)),
+    };
+    (said, result)
+}
+
+/// Runs a command silently and stops it when it takes longer than `limit`.
+pub fn read_within(command: &mut Command, limit: Duration) -> Result<Said, Failure> {
+    let start = Instant::now();
+    let mut child = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|source| not_started(command, source))?;
+    let (out, err) = (child.stdout.take(), child.stderr.take());
+    let (status, said) = thread::scope(|scope| {
+        let out = scope.spawn(move || out.map(all).unwrap_or_default());
+        let err = scope.spawn(move || err.map(all).unwrap_or_default());
+        let status = loop {
+            match child.try_wait() {
+                Ok(Some(status)) => break status.to_string(),
+                Ok(None) if start.elapsed() < limit => thread::sleep(Duration::from_millis(20)),
+                _ => {
+                    // Killing fails only for a child that has just ended by itself.
+                    let _ = child.kill();
+                    let _ = child.wait();
+                    break format!("no end after {} s", limit.as_secs());
+                }
+            }
+        };
+        (status, Said { out: out.join().unwrap_or_default(), err: err.join().unwrap_or_default() })
+    });
+    if status == "exit status: 0" {
+        return Ok(said);
+    }
+    eprint!("{}{}", said.out, said.err);
+    Err(ended(command, &status))
+}
+
+fn all(mut pipe: impl Read) -> String {
+    let mut bytes = Vec::new();
+    // A pipe that breaks ends the output; the exit status tells the rest.
+    let _ = pipe.read_to_end(&mut bytes);
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn copy(pipe: impl Read, mut to: impl Write) -> String {
+    let mut kept = String::new();
+    let mut pipe = BufReader::new(pipe);
+    let mut line = Vec::new();
+    while pipe.read_until(b'\n', &mut line).is_ok_and(|count| count > 0) {
+        // Nobody reading this terminal is no reason to stop the checks.
+        let _ = to.write_all(&line).and_then(|()| to.flush());
+        kept.push_str(&String::from_utf8_lossy(&line));
+        line.clear();
+    }
+    kept
+}
+
+fn not_started(command: &Command, source: std::io::Error) -> Failure {
+    Failure::NotStarted { program: command.get_program().to_string_lossy().into_owned(), source }
+}
+
+fn ended(command: &Command, status: &str) -> Failure {
+    Failure::Ended { command: typed(command), status: status.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_that_hangs_is_stopped() {
+        let failure = read_within(&mut program("sleep", ["30"]), Duration::from_millis(100)).err();
+        assert_eq!(
+            failure.map(|failure| failure.to_string()).as_deref(),
+            Some("`sleep 30` ended with no end after 0 s")
+        );
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_is_named() {
+        let failure = read(&mut program("no-such-program", [""; 0])).err().map(|failure| failure.to_string());
+        assert!(failure.is_some_and(|text| text.starts_with("cannot start `no-such-program`: ")));
+    }
+
+    #[test]
+    fn output_is_kept_though_the_program_failed() {
+        let (said, result) = show_and_read(&mut program("sh", ["-c", "echo kept; exit 3"]));
+        assert_eq!(said.out, "kept\n");
+        assert!(result.is_err());
+    }
+}
