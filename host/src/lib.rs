@@ -1,6 +1,6 @@
 //! The laptop's side of Sohle: recordings, simulation, tracks, scores.
 
 pub mod cli;
-pub mod recording;
 pub mod export;
+pub mod recording;
 pub mod track;

@@ -6,7 +6,7 @@ use resvg::usvg::{Options, Tree};
 use std::sync::Arc;
 
 /// Pixels for each unit of the drawing: sharp on dense screens too.
-const DENSITY: f32 = 1.5;
+const DENSITY: f32 = 1.25;
 
 /// Family of the font that is built in.
 const FAMILY: &str = "Ubuntu";

@@ -15,11 +15,15 @@ const STRIP_HEIGHT: f64 = 150.0;
 /// One row of the table. **Units:** px.
 const ROW: f64 = 24.0;
 
+/// Between two arrows on a track, and the shortest stride that has room for one. **Units:** px.
+const ARROW_SPACING: f64 = 130.0;
+const SHORTEST_WITH_ARROW: f64 = 15.0;
+
 const PAPER: &str = "#ffffff";
 const FIELD: &str = "#fafaf8";
 const GRID: &str = "#e4e4df";
 const INK: &str = "#20242a";
-const FAINT: &str = "#666b73";
+const FAINT: &str = "#565b63";
 const STAIRS: &str = "#f3e7cf";
 const ELEVATOR: &str = "#dcecea";
 
@@ -44,7 +48,7 @@ pub fn draw(picture: &Picture) -> String {
     }
     plan.marks(&mut pen, &lines);
     let strip = Strip::of(&lines, plan.bottom + 62.0);
-    strip.grid(&mut pen, &lines);
+    strip.grid(&mut pen, &lines, shades.0.is_some());
     for line in &lines {
         strip.line(&mut pen, line, &shades);
     }
@@ -203,6 +207,29 @@ impl Plan {
                 dot_mark(pen, self.at(dot.position), dot.mode, radius, &fill);
             }
         }
+        if line.role == Role::Chosen {
+            self.arrows(pen, line);
+        }
+    }
+
+    /// Which way the walk goes, between two stances now and then.
+    fn arrows(&self, pen: &mut Pen, line: &Line) {
+        let mut walked = ARROW_SPACING / 2.0;
+        for pair in line.dots.windows(2) {
+            let length = self.pixels(&pair[0], &pair[1]);
+            walked += length;
+            if walked < ARROW_SPACING || length < SHORTEST_WITH_ARROW {
+                continue;
+            }
+            walked = 0.0;
+            let ([x1, y1], [x2, y2]) = (self.at(pair[0].position), self.at(pair[1].position));
+            let (ahead, left) = ((x2 - x1) / length, (y2 - y1) / length);
+            let middle = [(x1 + x2) / 2.0, (y1 + y2) / 2.0];
+            let corner = |along: f64, across: f64| {
+                [middle[0] + along * ahead - across * left, middle[1] + along * left + across * ahead]
+            };
+            pen.polyline([corner(-3.0, 4.5), corner(3.0, 0.0), corner(-3.0, -4.5)], INK, 1.6, 1.0);
+        }
     }
 
     /// As large as fits between two stances; nothing where they run into one another.
@@ -280,7 +307,7 @@ impl Strip {
         ]
     }
 
-    fn grid(&self, pen: &mut Pen, lines: &[&Line]) {
+    fn grid(&self, pen: &mut Pen, lines: &[&Line], shaded: bool) {
         pen.rectangle([LEFT, self.top], [RIGHT - LEFT, self.bottom - self.top], FIELD);
         if let Some(chosen) = lines.last() {
             self.bands(pen, chosen);
@@ -297,7 +324,9 @@ impl Strip {
             pen.line([LEFT, at], [RIGHT, at], GRID, 1.0);
             pen.text([LEFT - 8.0, at + 4.5], &label(y, spacing), Lettering { anchor: Anchor::End, ..SMALL });
         }
-        pen.text([LEFT, self.top - 8.0], "height in metres", SMALL);
+        let caption =
+            if shaded { "height in metres; the darker a stance, the higher it is" } else { "height in metres" };
+        pen.text([LEFT, self.top - 8.0], caption, SMALL);
         let end = Lettering { anchor: Anchor::End, ..SMALL };
         pen.text([RIGHT, self.bottom + 34.0], "distance walked in metres", end);
     }
@@ -318,8 +347,11 @@ impl Strip {
             let ([left, _], [right, _]) = (self.at(from, 0.0), self.at(to, 0.0));
             let width = (right - left).max(3.0);
             pen.rectangle([left, self.top], [width, self.bottom - self.top], fill);
-            if width > 44.0 {
-                pen.text([left + 5.0, self.bottom - 7.0], name, SMALL);
+            if width > 60.0 {
+                // In the corner that the line does not pass.
+                let climbs = run[run.len() - 1].position[2] > run[0].position[2];
+                let y = if climbs { self.top + 16.0 } else { self.bottom - 7.0 };
+                pen.text([left + 5.0, y], name, SMALL);
             }
         }
     }
@@ -329,8 +361,9 @@ impl Strip {
         let points = || distances(line).zip(heights(line)).map(|(distance, height)| self.at(distance, height));
         pen.polyline(points(), style.colour, style.width, style.opacity);
         if line.role == Role::Chosen && line.dots.len() < 1000 {
+            let radius = (0.45 * (RIGHT - LEFT) / line.dots.len().max(1) as f64).clamp(1.2, 3.2);
             for (at, dot) in points().zip(&line.dots) {
-                dot_mark(pen, at, dot.mode, 2.6, &shades.at(dot.position[2]));
+                dot_mark(pen, at, dot.mode, radius, &shades.at(dot.position[2]));
             }
         }
     }
