@@ -5,11 +5,14 @@
 //!   Rantakokko: "Zero-velocity detection - an algorithm evaluation", IEEE Trans. Biomed. Eng. 57(11), 2010). All four are
 //!   likelihood ratio tests for a standing foot that differ in what they look at.
 //!
+//! * [`adaptive`]: the project's own, for every pace with one setting.
+//!
 //! All use [`window::Window`], whose length is a time, and judge a sample from itself and earlier ones only.
 
 use crate::sample::{AccelCorrected, GyroCorrected};
 use crate::time::Micros;
 
+pub mod adaptive;
 pub mod amv;
 pub mod ared;
 pub mod documented;
@@ -65,8 +68,9 @@ mod tests {
     use std::boxed::Box;
     use std::vec::Vec;
 
-    fn all() -> [(&'static str, Box<dyn StanceDetector>); 5] {
+    fn all() -> [(&'static str, Box<dyn StanceDetector>); 6] {
         [
+            ("adaptive", Box::new(adaptive::Adaptive::new(&adaptive::Parameters::default()))),
             ("documented", Box::new(documented::Documented::new(&documented::Parameters::default()))),
             ("shoe", Box::new(shoe::Shoe::new(&shoe::Parameters::default()))),
             ("ared", Box::new(ared::Ared::new(&ared::Parameters::default()))),
