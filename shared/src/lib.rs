@@ -16,6 +16,7 @@
 extern crate std;
 
 pub mod preintegration;
+pub mod rest;
 pub mod sample;
 pub mod selftest;
 pub mod so3;
