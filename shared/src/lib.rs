@@ -6,7 +6,7 @@
 //! walks, on a PC; it gives the same bits on both.
 //!
 //! The data are types with units: [`time`], [`sample`] and [`step`]. Rotations are in [`so3`], the detectors that tell
-//! when the foot stands in [`stance`]. Everything comes together in [`tracker`]; [`selftest`] proves that a processor
+//! when the foot stands in [`stance`], the filters in [`filter`]. Everything comes together in [`tracker`]; [`selftest`] proves that a processor
 //! computes it as every other does.
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
@@ -15,6 +15,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod filter;
 pub mod preintegration;
 pub mod rest;
 pub mod sample;

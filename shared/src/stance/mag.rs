@@ -19,8 +19,9 @@ pub struct Parameters {
 }
 
 impl Default for Parameters {
+    /// The stillest moment of every surveyed stance at walking pace lies below this threshold; in a run it does not.
     fn default() -> Self {
-        Self { window_s: 0.06, threshold: 0.4 }
+        Self { window_s: 0.06, threshold: 0.25 }
     }
 }
 

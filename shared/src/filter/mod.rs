@@ -1,0 +1,10 @@
+//! Filters that follow the foot between stances and learn from each.
+//!
+//! [`unscented`] is the document's: an unscented Kalman filter on the manifold of attitude, position and velocity.
+//! [`state`] is that manifold and how a sample moves a point on it, [`rebase`] the new beginning at the end of each
+//! stance, [`covariance`] keeps the matrices usable in `f32`.
+
+pub mod covariance;
+pub mod rebase;
+pub mod state;
+pub mod unscented;
