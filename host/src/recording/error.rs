@@ -53,20 +53,18 @@ pub enum Problem {
     #[error("the mapping does not say {0}")]
     Incomplete(&'static str),
     /// A value that is no finite number.
-    #[error("line {line}, column {column}: {what}")]
+    #[error("{place}: {what}")]
     Value {
-        /// Counted from 1.
-        line: u64,
-        /// Its name or number.
-        column: String,
-        /// What is there instead.
+        /// Line or row (counted from 1) and column.
+        place: String,
+        /// What is there instead of a number.
         what: String,
     },
     /// Time runs backwards.
-    #[error("line {line}: time runs backwards by {seconds:.3} s, expected at most {MOST_BACKWARDS_S} s")]
+    #[error("{place}: time runs backwards by {seconds:.3} s, at most {MOST_BACKWARDS_S} s is taken for jitter")]
     Backwards {
-        /// Counted from 1.
-        line: u64,
+        /// Line or row, counted from 1.
+        place: String,
         /// How far. **Units:** s.
         seconds: f64,
     },
@@ -81,7 +79,7 @@ pub const MOST_BACKWARDS_S: f64 = 1.0;
 /// The plain name of the usual refusals, the system's own words for the others.
 fn said(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::NotFound => "no such file".into(),
+        io::ErrorKind::NotFound => "no such file or directory".into(),
         io::ErrorKind::PermissionDenied => "no permission".into(),
         _ => error.to_string(),
     }

@@ -4,13 +4,19 @@
 //! the layout or describes it (see [`mapping`] for how a user writes one).
 
 pub mod axes;
+mod check;
 pub mod error;
 mod gaitmap;
 mod koroglu;
 pub mod mapping;
+pub mod mat;
+pub mod mcap;
+mod message;
 mod openshoe;
 mod plain;
 pub mod profile;
+mod table;
+mod text;
 pub mod truth;
 mod ucr;
 pub mod unit;
@@ -24,6 +30,8 @@ pub use truth::{SimulatedTruth, TruthPose, TruthStance};
 use sohle_shared::sample::ImuSample;
 use sohle_shared::step::Step;
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Where the ranges of the sensor end, as far as known.
@@ -79,4 +87,95 @@ pub fn recordings_dir() -> Option<PathBuf> {
     }
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?;
     [project.join("recordings"), project.join("../shared/recordings")].into_iter().find(|path| path.is_dir())
+}
+
+impl Recording {
+    /// Usual number of samples in a second. **Units:** Hz; 0 with fewer than two moments.
+    pub fn rate_hz(&self) -> f64 {
+        table::usual_period(&self.samples).map_or(0.0, |period| 1.0 / period)
+    }
+
+    /// Time from the first sample to the last. **Units:** s.
+    pub fn duration_s(&self) -> f64 {
+        match (self.samples.first(), self.samples.last()) {
+            (Some(first), Some(last)) => (last.time - first.time) as f64 * 1e-6,
+            _ => 0.0,
+        }
+    }
+
+    /// What the accelerometer reads in the stillest second, or stance if there is no such second. **Units:** m/s².
+    pub fn gravity_at_rest(&self) -> Option<f64> {
+        check::rest(&self.samples).map(|rest| rest.accel)
+    }
+}
+
+/// Reads the recording at `path`. Without a profile the layout is recognised from the content.
+pub fn open(path: &Path, profile: Option<&Profile>) -> Result<Recording, RecordingError> {
+    let source = open_file(path)?;
+    read(path, source, profile)
+}
+
+/// Opens a recording's file, for [`read`].
+pub fn open_file(path: &Path) -> Result<File, RecordingError> {
+    let refused = |problem| RecordingError { path: path.into(), problem };
+    if path.is_dir() {
+        return Err(refused(Problem::Directory));
+    }
+    File::open(path).map_err(|error| refused(error.into()))
+}
+
+/// Reads a recording from the bytes of `source`; `path` gives it its name and stands in its errors.
+pub fn read(path: &Path, source: impl Read, profile: Option<&Profile>) -> Result<Recording, RecordingError> {
+    let mapping = profile.map(|profile| profile.mapping.clone()).unwrap_or_default();
+    let mut recording = read_bytes(source, mapping).map_err(|problem| RecordingError { path: path.into(), problem })?;
+    // An imported recording has no name yet; the project's own has one.
+    if recording.name.is_empty() {
+        let text = |part: Option<&std::ffi::OsStr>| part.map(|part| part.to_string_lossy().into_owned());
+        recording.name = text(path.file_stem()).unwrap_or_default();
+        recording.metadata.extend(text(path.file_name()).map(|file| ("file".to_owned(), file)));
+    }
+    Ok(recording)
+}
+
+/// So much of a file is looked at to recognise its layout. **Units:** bytes.
+const HEAD: u64 = 1 << 16;
+
+fn read_bytes(mut source: impl Read, mapping: Mapping) -> Result<Recording, Problem> {
+    let mut head = Vec::new();
+    source.by_ref().take(HEAD).read_to_end(&mut head)?;
+    let rest = head.as_slice().chain(source);
+    if head.is_empty() {
+        return Err(Problem::Empty);
+    }
+    if head.starts_with(mcap::MAGIC) {
+        if mapping != Mapping::default() {
+            return Err(Problem::Malformed("an MCAP says itself what is in it, it takes no profile".into()));
+        }
+        return mcap::read(BufReader::new(rest));
+    }
+    if head.starts_with(mat::MAGIC) {
+        return mat::read(rest, mapping);
+    }
+    if let Some(place) = head.iter().position(|&byte| byte == 0) {
+        return Err(Problem::Malformed(format!("neither text nor MCAP nor MATLAB v5: a zero at byte {place}")));
+    }
+    let mapping = complete(mapping, |mapping| text::recognise(&head, mapping))?;
+    text::read(BufReader::new(rest), &mapping).map(|recording| named(recording, &mapping))
+}
+
+/// Fills a mapping up from its base, or from the preset that `recognise` finds if it needs one.
+fn complete(mapping: Mapping, recognise: impl Fn(&Mapping) -> Result<Preset, Problem>) -> Result<Mapping, Problem> {
+    let base = match mapping.base {
+        Some(base) => base,
+        None if mapping.accel.is_some() && mapping.gyro.is_some() => return Ok(mapping),
+        None => recognise(&mapping)?,
+    };
+    Ok(Mapping { base: Some(base), ..mapping.over(base.mapping()) })
+}
+
+/// Notes where a recording came from.
+fn named(mut recording: Recording, mapping: &Mapping) -> Recording {
+    let profile = mapping.base.map_or("mapping", Preset::name);
+    recording.metadata.insert("profile".into(), profile.into());
+    recording
 }

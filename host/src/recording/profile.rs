@@ -1,8 +1,8 @@
 //! Profiles: names for the layouts of known recordings, and files that describe others.
 
-use super::error::ProfileError;
-use super::mapping::Mapping;
-use super::{gaitmap, koroglu, openshoe, plain, ucr, xio};
+use super::error::{ProfileError, RecordingError};
+use super::mapping::{Column, Mapping};
+use super::{Recording, gaitmap, koroglu, openshoe, plain, ucr, xio};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -71,6 +71,18 @@ impl Preset {
             .ok_or_else(|| ProfileError::Unknown { name: name.into(), known: known() })
     }
 
+    /// Whether a file with these column names is surely of this kind.
+    pub(super) fn fits(self, names: &[String]) -> bool {
+        let mapping = self.mapping();
+        let mut columns =
+            mapping.time.iter().chain(mapping.accel.iter().flatten()).chain(mapping.gyro.iter().flatten());
+        let named = |column: &Column| {
+            matches!(column, Column::Name(_)) && names.iter().enumerate().any(|(index, name)| column.fits(name, index))
+        };
+        // The other names of `ucr` are too common to stand for its rate.
+        columns.all(named) && (self != Self::Ucr || names.iter().any(|name| name == ucr::SIGNATURE))
+    }
+
     /// The columns, units and range it stands for.
     pub fn mapping(self) -> Mapping {
         match self {
@@ -122,7 +134,8 @@ impl Profile {
         let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Io { path: path.into(), source })?;
         let refused = |message| ProfileError::File { path: path.into(), message };
         let mapping: Mapping = toml::from_str(&text).map_err(|error| {
-            let line = error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+            let line =
+                error.span().map_or(1, |span| 1 + text.bytes().take(span.start).filter(|&byte| byte == b'\n').count());
             refused(format!("line {line}: {}", error.message().replace('\n', " ")))
         })?;
         mapping.validate().map_err(refused)?;
@@ -156,6 +169,22 @@ impl Source {
         mapping.validate().map_err(ProfileError::Mapping)?;
         Ok(Profile { mapping })
     }
+
+    /// Reads the recording; a relative path starts at `directory`.
+    pub fn open(&self, directory: &Path) -> Result<Recording, SourceError> {
+        let profile = self.resolve(directory)?;
+        Ok(super::open(&directory.join(&self.path), Some(&profile))?)
+    }
+}
+
+/// A [`Source`] could not be read: because of its description or because of its file.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub enum SourceError {
+    /// The description.
+    Profile(#[from] ProfileError),
+    /// The file.
+    Recording(#[from] RecordingError),
 }
 
 #[cfg(test)]
@@ -194,7 +223,7 @@ mod tests {
             assert!(message.contains(part) && !message.contains('\n'), "{message}");
         }
         let message = Profile::parse("/nowhere/at/all.toml").unwrap_err().to_string();
-        assert_eq!(message, "/nowhere/at/all.toml: no such file");
+        assert_eq!(message, "/nowhere/at/all.toml: no such file or directory");
     }
 
     #[test]

@@ -5,6 +5,9 @@
 use super::mapping::{Mapping, named};
 use super::unit::{AccelUnit, GyroUnit};
 
+/// The column by which such a file is recognised.
+pub(super) const SIGNATURE: &str = "is_zero_vel";
+
 /// The columns of the profile.
 pub(super) fn mapping() -> Mapping {
     Mapping {
@@ -14,5 +17,21 @@ pub(super) fn mapping() -> Mapping {
         gyro: named(["gyro_x", "gyro_y", "gyro_z"]),
         gyro_unit: Some(GyroUnit::RadianPerSecond),
         ..Mapping::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{open, recordings_dir};
+
+    #[test]
+    fn the_walk_is_recognised_and_read() {
+        let Some(folder) = recordings_dir() else { return };
+        let walk = open(&folder.join("foot_ucr_mocap/imuMeasLeft.csv"), None).unwrap();
+        assert_eq!(walk.samples.len(), 7201);
+        assert!((walk.duration_s() - 120.0).abs() < 1e-6);
+        assert_eq!(walk.samples[0].accel.0.x, 0.331_804_215_9_f64 as f32);
+        let gravity = walk.gravity_at_rest().unwrap();
+        assert!((gravity - 9.81).abs() < 0.02 * 9.81, "{gravity}");
     }
 }

@@ -1,0 +1,157 @@
+//! MATLAB v5 files: numeric variables as tables.
+//!
+//! A recording's variables have one row for each sample. A variable of one column is a column of the table under its own
+//! name; those of several are called `NAME.1`, `NAME.2`, and so on.
+
+use super::error::Problem;
+use super::mapping::Mapping;
+use super::profile::{Preset, known};
+use super::table::{Collector, Places, listed};
+use super::{Recording, RecordingError, complete, named};
+use matfile::{MatFile, NumericData};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+/// The first bytes of such a file.
+pub(super) const MAGIC: &[u8] = b"MATLAB 5.0 MAT-file";
+/// Length of the text and the version at the start. **Units:** bytes.
+const HEADER: usize = 128;
+/// More columns in one variable are no table of a sensor.
+const MOST_COLUMNS: usize = 64;
+/// Kinds of element that hold a variable: as it is, and compressed.
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+
+/// A numeric variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrix {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// Column after column.
+    pub values: Vec<f64>,
+}
+
+impl Matrix {
+    /// The value in a row and a column, both counted from 0.
+    pub fn get(&self, row: usize, column: usize) -> Option<f64> {
+        let inside = row < self.rows && column < self.columns;
+        inside.then(|| self.values.get(column * self.rows + row).copied()).flatten()
+    }
+}
+
+/// All numeric variables of two dimensions in the file at `path`, by name. A single row is given as a column.
+pub fn variables(path: &Path) -> Result<BTreeMap<String, Matrix>, RecordingError> {
+    let source = super::open_file(path)?;
+    parse(source).map_err(|problem| RecordingError { path: path.into(), problem })
+}
+
+fn parse(mut source: impl Read) -> Result<BTreeMap<String, Matrix>, Problem> {
+    let mut bytes = Vec::new();
+    source.read_to_end(&mut bytes)?;
+    if bytes.is_empty() {
+        return Err(Problem::Empty);
+    }
+    if !bytes.starts_with(MAGIC) {
+        return Err(Problem::Malformed("not a MATLAB v5 file".into()));
+    }
+    walk(&bytes)?;
+    let file = MatFile::parse(bytes.as_slice())
+        .map_err(|error| Problem::Malformed(format!("damaged MATLAB file: {error}")))?;
+    Ok(file.arrays().iter().filter_map(|array| Some((array.name().to_owned(), matrix(array)?))).collect())
+}
+
+/// Checks that the elements fill the file exactly: the library takes the first damaged one for the end of the file.
+fn walk(bytes: &[u8]) -> Result<(), Problem> {
+    let cut =
+        |count: usize| Problem::Truncated(format!("the MATLAB file ends in the middle of variable {}", count + 1));
+    let order =
+        bytes.get(HEADER - 2..HEADER).ok_or_else(|| Problem::Truncated("the MATLAB file ends in its header".into()))?;
+    let word: fn([u8; 4]) -> u32 = match order {
+        b"IM" => u32::from_le_bytes,
+        b"MI" => u32::from_be_bytes,
+        _ => return Err(Problem::Malformed("damaged MATLAB file: no byte order in its header".into())),
+    };
+    let mut rest = &bytes[HEADER..];
+    let mut count = 0;
+    while !rest.is_empty() {
+        let (kind, behind) = rest.split_first_chunk().ok_or_else(|| cut(count))?;
+        let (length, behind) = behind.split_first_chunk().ok_or_else(|| cut(count))?;
+        let (kind, length) = (word(*kind), word(*length) as usize);
+        if kind != MATRIX && kind != COMPRESSED {
+            return Err(Problem::Malformed(format!("damaged MATLAB file: variable {} is of kind {kind}", count + 1)));
+        }
+        rest = behind.get(length..).ok_or_else(|| cut(count))?;
+        count += 1;
+    }
+    Ok(())
+}
+
+fn matrix(array: &matfile::Array) -> Option<Matrix> {
+    let &[rows, columns] = array.size().as_slice() else { return None };
+    let values = match array.data() {
+        NumericData::Int8 { real, .. } => wide(real),
+        NumericData::UInt8 { real, .. } => wide(real),
+        NumericData::Int16 { real, .. } => wide(real),
+        NumericData::UInt16 { real, .. } => wide(real),
+        NumericData::Int32 { real, .. } => wide(real),
+        NumericData::UInt32 { real, .. } => wide(real),
+        NumericData::Single { real, .. } => wide(real),
+        NumericData::Double { real, .. } => real.clone(),
+        // Counts beyond 2^53 are no measurement.
+        NumericData::Int64 { real, .. } => real.iter().map(|&value| value as f64).collect(),
+        NumericData::UInt64 { real, .. } => real.iter().map(|&value| value as f64).collect(),
+    };
+    let (rows, columns) = if rows == 1 { (columns, 1) } else { (rows, columns) };
+    (rows.checked_mul(columns) == Some(values.len())).then_some(Matrix { rows, columns, values })
+}
+
+fn wide<T: Copy + Into<f64>>(values: &[T]) -> Vec<f64> {
+    values.iter().map(|&value| value.into()).collect()
+}
+
+/// Reads a recording whose variables `mapping` names.
+pub(super) fn read(source: impl Read, mapping: Mapping) -> Result<Recording, Problem> {
+    let variables = parse(source)?;
+    let mut names = Vec::new();
+    let mut columns = Vec::new();
+    for (name, matrix) in variables.iter().filter(|(_, matrix)| matrix.columns <= MOST_COLUMNS) {
+        for column in 0..matrix.columns {
+            names.push(if matrix.columns == 1 { name.clone() } else { format!("{name}.{}", column + 1) });
+            columns.push((matrix, column));
+        }
+    }
+    let mapping = complete(mapping, |_| match Preset::KorogluMat.fits(&names) {
+        true => Ok(Preset::KorogluMat),
+        false => Err(Problem::Unrecognised(format!(
+            "layout not recognised from its variables ({}); name a profile ({}) or describe it in a FILE.toml",
+            listed(&names),
+            known()
+        ))),
+    })?;
+    let places = Places::find(&mapping, &names)?;
+    let lengths: Vec<(usize, usize)> =
+        places.iter().filter_map(|place| Some((place, columns.get(place)?.0.rows))).collect();
+    let rows = lengths.first().map_or(0, |&(_, rows)| rows);
+    if let Some(&(place, other)) = lengths.iter().find(|&&(_, other)| other != rows) {
+        return Err(Problem::Malformed(format!("{} has {other} rows, other columns have {rows}", names[place])));
+    }
+    if rows == 0 {
+        return Err(Problem::NoSamples("the variables are empty".into()));
+    }
+    let mut collector = Collector::new(&mapping)?;
+    for index in 0..rows {
+        let place_of = |column: usize| format!("row {}, {}", index + 1, names[column]);
+        let row = places.row(|place| match columns[place].0.get(index, columns[place].1) {
+            Some(value) if value.is_finite() => Ok(value),
+            other => Err(Problem::Value {
+                place: place_of(place),
+                what: format!("{} is not a finite number", other.unwrap_or(f64::NAN)),
+            }),
+        })?;
+        collector.push(row, || format!("row {}", index + 1))?;
+    }
+    collector.finish().map(|recording| named(recording, &mapping))
+}
