@@ -6,8 +6,8 @@
 //! walks, on a PC; it gives the same bits on both.
 //!
 //! The data are types with units: [`time`], [`sample`] and [`step`]. Rotations are in [`so3`], the detectors that tell
-//! when the foot stands in [`stance`], the filters in [`filter`]. Everything comes together in [`tracker`]; [`selftest`] proves that a processor
-//! computes it as every other does.
+//! when the foot stands in [`stance`], the filters that follow it in [`filter`]. Everything comes together in
+//! [`tracker`]; [`selftest`] proves that a processor computes it as every other does.
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]
