@@ -5,6 +5,7 @@ mod ci;
 mod device;
 mod emulator;
 mod process;
+mod recordings;
 mod stage;
 mod tools;
 
@@ -28,6 +29,8 @@ enum Command {
     Device,
     /// Runs the tracker on an emulated Cortex-M4F: the bits must be the host's; prints its cost.
     Emulator,
+    /// Fetches the recordings of the manifest from their upstream repositories.
+    Recordings(recordings::Arguments),
     /// Checks what is committed: no data, licences of the dependencies, the changelog.
     Check,
     /// Installs the Debian packages that the other commands need and that are missing.
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
         Command::Ci(arguments) => return if ci::run(&arguments) { ExitCode::SUCCESS } else { ExitCode::FAILURE },
         Command::Device => device::build_shared(),
         Command::Emulator => emulator::run(),
+        Command::Recordings(arguments) => recordings::run(&arguments),
         Command::Check => check::run(),
         Command::Install => tools::install(&tools::ALL),
     };

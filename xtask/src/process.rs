@@ -117,9 +117,16 @@ pub fn show_and_read(command: &mut Command) -> (Said, Result<(), Failure>) {
     (said, result)
 }
 
-/// Runs a command silently and stops it when it takes longer than `limit`.
-pub fn read_within(command: &mut Command, limit: Duration) -> Result<Said, Failure> {
-    let start = Instant::now();
+/// How a command that was watched ended.
+pub struct Ended {
+    /// What it wrote.
+    pub said: Said,
+    /// Its exit code; none when it was stopped, by us or by a signal.
+    pub code: Option<i32>,
+}
+
+/// Runs a command silently, asking `keep` about ten times each second; it is stopped when that says no.
+pub fn watch(command: &mut Command, mut keep: impl FnMut() -> bool) -> Result<Ended, Failure> {
     let mut child = command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -127,27 +134,40 @@ pub fn read_within(command: &mut Command, limit: Duration) -> Result<Said, Failu
         .spawn()
         .map_err(|source| not_started(command, source))?;
     let (out, err) = (child.stdout.take(), child.stderr.take());
-    let (status, said) = thread::scope(|scope| {
+    Ok(thread::scope(|scope| {
         let out = scope.spawn(move || out.map(all).unwrap_or_default());
         let err = scope.spawn(move || err.map(all).unwrap_or_default());
-        let status = loop {
+        let mut pause = Duration::from_millis(1);
+        let code = loop {
             match child.try_wait() {
-                Ok(Some(status)) => break status.to_string(),
-                Ok(None) if start.elapsed() < limit => thread::sleep(Duration::from_millis(20)),
+                Ok(Some(status)) => break status.code(),
+                Ok(None) if keep() => thread::sleep(pause),
                 _ => {
                     // Killing fails only for a child that has just ended by itself.
                     let _ = child.kill();
                     let _ = child.wait();
-                    break format!("no end after {} s", limit.as_secs());
+                    break None;
                 }
             }
+            pause = (2 * pause).min(Duration::from_millis(100));
         };
-        (status, Said { out: out.join().unwrap_or_default(), err: err.join().unwrap_or_default() })
-    });
-    if status == "exit status: 0" {
+        Ended { said: Said { out: out.join().unwrap_or_default(), err: err.join().unwrap_or_default() }, code }
+    }))
+}
+
+/// Runs a command silently and stops it when it takes longer than `limit`. Its output is shown only when it fails.
+pub fn read_within(command: &mut Command, limit: Duration) -> Result<Said, Failure> {
+    let start = Instant::now();
+    let Ended { said, code } = watch(command, || start.elapsed() < limit)?;
+    if code == Some(0) {
         return Ok(said);
     }
     eprint!("{}{}", said.out, said.err);
+    let status = match code {
+        Some(code) => format!("exit code {code}"),
+        None if start.elapsed() >= limit => format!("no end after {} s", limit.as_secs_f64()),
+        None => "a signal".into(),
+    };
     Err(ended(command, &status))
 }
 
@@ -188,7 +208,7 @@ mod tests {
         let failure = read_within(&mut program("sleep", ["30"]), Duration::from_millis(100)).err();
         assert_eq!(
             failure.map(|failure| failure.to_string()).as_deref(),
-            Some("`sleep 30` ended with no end after 0 s")
+            Some("`sleep 30` ended with no end after 0.1 s")
         );
     }
 
