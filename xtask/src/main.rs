@@ -1,5 +1,6 @@
 //! The project's own commands, beyond what cargo has: `cargo xtask --help` lists them.
 
+mod bench;
 mod check;
 mod ci;
 mod device;
@@ -29,6 +30,8 @@ enum Command {
     Device,
     /// Runs the tracker on an emulated Cortex-M4F: the bits must be the host's; prints its cost.
     Emulator,
+    /// Counts the instructions of the documented and the default filter under callgrind.
+    Bench,
     /// Fetches the recordings of the manifest from their upstream repositories.
     Recordings(recordings::Arguments),
     /// Checks what is committed: no data, licences of the dependencies, the changelog.
@@ -52,6 +55,7 @@ fn main() -> ExitCode {
         Command::Ci(arguments) => return if ci::run(&arguments) { ExitCode::SUCCESS } else { ExitCode::FAILURE },
         Command::Device => device::build_shared(),
         Command::Emulator => emulator::run(),
+        Command::Bench => bench::run(),
         Command::Recordings(arguments) => recordings::run(&arguments),
         Command::Check => check::run(),
         Command::Install => tools::install(&tools::ALL),
