@@ -3,64 +3,41 @@
 //! Counts, unlike times, are the same on every run and on a busy machine. Callgrind itself is called rather than a bench
 //! framework: one function is switched on and off, and one number is read.
 
+use crate::cost::{self, Cost, Phases};
 use crate::process::{self, Failure};
 use crate::tools;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Sampling of the counted walks. **Units:** microseconds.
 const PERIODS_US: [u32; 2] = [5_000, 500];
 
-/// What the default filter may cost of the documented one, in the mean over a walk at 200 Hz.
+/// What the default filter may cost of the documented one, while the foot moves.
 const LARGEST_SHARE: f64 = 0.5;
-
-/// Instructions over the samples of one phase of the walk.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Cost {
-    samples: u64,
-    instructions: u64,
-}
-
-impl Cost {
-    fn mean(self) -> f64 {
-        self.instructions as f64 / self.samples.max(1) as f64
-    }
-
-    fn with(self, other: Self) -> Self {
-        Self { samples: self.samples + other.samples, instructions: self.instructions + other.instructions }
-    }
-}
 
 /// Prints the cost of both settings at both samplings. An error when the default filter costs too much.
 pub fn run() -> Result<(), Failure> {
     tools::VALGRIND.required()?;
     let program = build()?;
-    let mut share = 0.0;
+    let mut shares = Vec::new();
     for period_us in PERIODS_US {
+        let default = phases(&program, "default", period_us)?;
+        let documented = phases(&program, "documented", period_us)?;
         println!("instructions for each IMU sample at {} Hz (x86-64, callgrind)", 1_000_000 / period_us);
-        println!("{:<12} {:>10} {:>10} {:>10} {:>10}", "setting", "swinging", "standing", "mean", "samples");
-        let [default, documented] = [row(&program, "default", period_us)?, row(&program, "documented", period_us)?];
-        let ratios = default.iter().zip(&documented).map(|(default, documented)| default.mean() / documented.mean());
-        let ratios: Vec<f64> = ratios.collect();
-        println!("{:<12} {:>10.3} {:>10.3} {:>10.3}\n", "ratio", ratios[0], ratios[1], ratios[2]);
-        if period_us == PERIODS_US[0] {
-            share = ratios[2];
-        }
+        println!("{}", cost::table(default, documented));
+        shares.push(default.share_of_predictions(documented));
     }
-    if share <= LARGEST_SHARE {
-        return Ok(());
+    match shares.iter().find(|&&share| share.is_nan() || share > LARGEST_SHARE) {
+        None => Ok(()),
+        Some(share) => Err(Failure::Found(format!(
+            "a prediction of the default filter costs {share:.2} of the documented one, more than {LARGEST_SHARE}"
+        ))),
     }
-    Err(Failure::Found(format!("the default filter costs {share:.2} of the documented one, more than {LARGEST_SHARE}")))
 }
 
-/// Swinging, standing, both; printed.
-fn row(program: &PathBuf, setting: &str, period_us: u32) -> Result<[Cost; 3], Failure> {
+fn phases(program: &Path, setting: &str, period_us: u32) -> Result<Phases, Failure> {
     let swinging = count(program, setting, "swinging", period_us)?;
-    let standing = count(program, setting, "standing", period_us)?;
-    let both = swinging.with(standing);
-    let [a, b, c] = [swinging, standing, both].map(Cost::mean);
-    println!("{setting:<12} {a:>10.0} {b:>10.0} {c:>10.0} {:>10}", both.samples);
-    Ok([swinging, standing, both])
+    Ok(Phases { swinging, standing: count(program, setting, "standing", period_us)? })
 }
 
 fn build() -> Result<PathBuf, Failure> {
@@ -69,11 +46,11 @@ fn build() -> Result<PathBuf, Failure> {
         "build --release --locked --package sohle-shared --example cost --message-format json-render-diagnostics";
     let said = process::read(command.args(words.split(' ')))?;
     let messages = said.out.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
-    let built = messages.filter_map(|message| message.get("executable")?.as_str().map(PathBuf::from)).last();
+    let built = messages.filter_map(|message| message.get("executable")?.as_str().map(PathBuf::from)).next_back();
     built.ok_or_else(|| Failure::Found("cargo built no example `cost`".into()))
 }
 
-fn count(program: &PathBuf, setting: &str, phase: &str, period_us: u32) -> Result<Cost, Failure> {
+fn count(program: &Path, setting: &str, phase: &str, period_us: u32) -> Result<Cost, Failure> {
     let words = "--tool=callgrind --collect-atstart=no --toggle-collect=*counted* --callgrind-out-file=/dev/null";
     let mut command = Command::new("valgrind");
     command.args(words.split(' ')).arg(program).args([setting, phase, &period_us.to_string()]);
@@ -100,12 +77,5 @@ mod tests {
         let text = "==7== Callgrind, a call-graph profiler\n==7== Events    : Ir\n==7== Collected : 123456\n==7== \n";
         assert_eq!(collected(text), Some(123_456));
         assert_eq!(collected("==7== Events    : Ir\n"), None);
-    }
-
-    #[test]
-    fn means_are_weighted_by_samples() {
-        let all = Cost { samples: 1, instructions: 100 }.with(Cost { samples: 3, instructions: 60 });
-        assert_eq!(all.mean(), 40.0);
-        assert_eq!(Cost::default().mean(), 0.0);
     }
 }

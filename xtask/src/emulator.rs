@@ -1,5 +1,6 @@
 //! The tracker on an emulated Cortex-M4F: its bits must be the host's, and its cost is told.
 
+use crate::cost::{self, Cost, Phases};
 use crate::process::{self, Failure, Said};
 use crate::{device, in_root, tools};
 use std::time::Duration;
@@ -20,11 +21,30 @@ pub fn run() -> Result<(), Failure> {
     let pairs = compare(&lines(&native, ""), &lines(&emulated, "bits "))?;
     println!("{pairs} fingerprints of host and Cortex-M4F are equal:");
     print!("{native}");
-    println!("\nInstructions on the Cortex-M4F for each sample, and depth of the stack in bytes:");
-    for line in lines(&emulated, "cost ").iter().chain(&lines(&emulated, "stack ")) {
+    println!("\ninstructions for each IMU sample at 200 Hz (Cortex-M4F)");
+    println!("{}", cost::table(phases(&emulated, "default")?, phases(&emulated, "documented")?));
+    println!("most instructions for a sample, and depth of the stack in bytes with the tracker on it");
+    for line in lines(&emulated, "most ").iter().chain(&lines(&emulated, "stack ")) {
         println!("{line}");
     }
     Ok(())
+}
+
+/// What the emulator counted: lines of setting, phase, samples, instructions.
+fn phases(emulated: &str, setting: &str) -> Result<Phases, Failure> {
+    let phase = |name: &str| {
+        let start = format!("cost {setting} {name} ");
+        let numbers: Vec<u64> =
+            lines(emulated, &start).first()?.split(' ').map_while(|word| word.parse().ok()).collect();
+        match numbers[..] {
+            [samples, instructions] => Some(Cost { samples, instructions }),
+            _ => None,
+        }
+    };
+    match (phase("swinging"), phase("standing")) {
+        (Some(swinging), Some(standing)) => Ok(Phases { swinging, standing }),
+        _ => Err(Failure::Found(format!("the emulator told no cost of the {setting} setting"))),
+    }
 }
 
 fn emulate() -> Result<Said, Failure> {
@@ -65,5 +85,13 @@ mod tests {
         assert_eq!(told(&["a 1"], &["a 2"]).as_deref(), Some("the bits differ: host `a 1`, Cortex-M4F `a 2`"));
         assert_eq!(told(&["a 1"], &[]).as_deref(), Some("1 fingerprints on the host, 0 in the emulator"));
         assert!(told(&[], &[]).is_some());
+    }
+
+    #[test]
+    fn the_cost_is_read_from_what_the_emulator_says() {
+        let text = "bits default 1\ncost default swinging 2 90\ncost default standing 1 70\n";
+        let cost = |samples, instructions| Cost { samples, instructions };
+        assert_eq!(phases(text, "default").ok(), Some(Phases { swinging: cost(2, 90), standing: cost(1, 70) }));
+        assert!(phases(text, "documented").is_err());
     }
 }

@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod ci;
+mod cost;
 mod device;
 mod emulator;
 mod process;

@@ -22,7 +22,7 @@ const PER_TICK: u64 = 40;
 /// Largest value of the 24-bit counter; it counts down. 671 million instructions pass before it comes around.
 const RELOAD: u32 = 0x00ff_ffff;
 
-/// Instructions of the samples of one kind.
+/// What the samples of one phase of the walk cost.
 #[derive(Default)]
 struct Cost {
     samples: u64,
@@ -37,10 +37,9 @@ impl Cost {
         self.most = self.most.max(u64::from(ticks));
     }
 
-    fn print(&self, name: &str, kind: &str) {
-        let Self { samples, ticks, most } = self;
-        let mean = ticks * PER_TICK / (*samples).max(1);
-        hprintln!("cost {} {} samples {} mean {} most {}", name, kind, samples, mean, most * PER_TICK);
+    fn print(&self, name: &str, phase: &str) {
+        hprintln!("cost {} {} {} {}", name, phase, self.samples, self.ticks * PER_TICK);
+        hprintln!("most {} {} {}", name, phase, self.most * PER_TICK);
     }
 }
 
