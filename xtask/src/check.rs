@@ -54,7 +54,7 @@ pub fn no_data() -> Result<(), Failure> {
 fn objection(file: &Committed, known: &BTreeSet<String>) -> Option<String> {
     let path = file.path;
     let ending = Path::new(path).extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-    if path.split('/').any(|part| part == "recordings") {
+    if path.starts_with("recordings/") {
         Some(format!("{path} is committed, but recordings are fetched, not committed"))
     } else if known.contains(&file.sha256) {
         Some(format!("{path} is a copy of a recording of the manifest"))
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn sources_and_pictures_may_be_committed() {
         let known = BTreeSet::new();
-        for path in ["shared/src/lib.rs", "docs/track.png", "tests/recordings.toml", "host/src/recording/mcap.rs"] {
+        for path in ["shared/src/lib.rs", "docs/track.png", "tests/recordings.toml", "xtask/src/recordings/fetch.rs"] {
             assert_eq!(objection(&file(path, 20_000), &known), None);
         }
     }
