@@ -5,6 +5,7 @@
 //! the standard error output, and an error ends the program with one line and exit code 1 (2 if the command line itself
 //! was wrong).
 
+pub mod convert;
 mod error;
 pub mod parameters;
 
@@ -27,12 +28,14 @@ pub struct Cli {
 /// What the program can be asked for, in the order of the help.
 #[derive(Debug, clap::Subcommand)]
 enum Command {
+    Convert(convert::Args),
     Parameters(parameters::Args),
 }
 
 /// Runs the command.
 fn dispatch(command: Command) -> Result<(), Error> {
     match command {
+        Command::Convert(args) => convert::run(args),
         Command::Parameters(args) => parameters::run(args),
     }
 }
