@@ -155,3 +155,88 @@ pub(super) fn read(source: impl Read, mapping: Mapping) -> Result<Recording, Pro
     }
     collector.finish().map(|recording| named(recording, &mapping))
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::recording;
+
+    /// One uncompressed variable of doubles.
+    fn variable(name: &str, rows: usize, values: &[f64]) -> Vec<u8> {
+        let element = |kind: u32, data: &[u8]| {
+            let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
+            bytes.extend(data);
+            bytes.resize(bytes.len().next_multiple_of(8), 0);
+            bytes
+        };
+        let words = |words: [u32; 2]| words.map(u32::to_le_bytes).concat();
+        let columns = values.len() / rows.max(1);
+        let numbers: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let body = [
+            element(6, &words([6, 0])),
+            element(5, &words([rows as u32, columns as u32])),
+            element(1, name.as_bytes()),
+            element(9, &numbers),
+        ];
+        element(MATRIX, &body.concat())
+    }
+
+    fn file(variables: &[Vec<u8>]) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        bytes.resize(HEADER - 4, b' ');
+        bytes.extend(b"\x00\x01IM");
+        bytes.extend(variables.concat());
+        bytes
+    }
+
+    /// A foot at rest for `rows` samples.
+    pub fn walk(rows: usize) -> Vec<u8> {
+        let times: Vec<f64> = (0..rows).map(|row| row as f64 * 0.005).collect();
+        let data: Vec<f64> = [0.0, 0.0, 9.81, 0.01, 0.0, 0.0].iter().flat_map(|&value| vec![value; rows]).collect();
+        file(&[variable("timestamps", rows, &times), variable("imu_data", rows, &data)])
+    }
+
+    fn read(bytes: &[u8]) -> Result<Recording, String> {
+        recording::read("walk.mat".as_ref(), bytes, None).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_file_is_read() {
+        let walk = read(&walk(30)).unwrap();
+        assert_eq!(walk.samples.len(), 30);
+        assert_eq!((walk.samples[7].time.0, walk.samples[7].accel.0.z, walk.samples[7].gyro.0.x), (35_000, 9.81, 0.01));
+    }
+
+    #[test]
+    fn every_cut_is_noticed() {
+        let whole = walk(10);
+        let first = HEADER + variable("timestamps", 10, &[0.0; 10]).len();
+        for length in MAGIC.len()..whole.len() {
+            let message = read(&whole[..length]).unwrap_err();
+            match length {
+                // Exactly between two variables, or before the first, nothing is cut but something is missing.
+                _ if length == HEADER || length == first => assert!(message.contains("not recognised"), "{message}"),
+                _ => {
+                    assert!(message.starts_with("walk.mat: truncated: the MATLAB file ends in "), "{length}: {message}")
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn faults_are_told() {
+        let times = variable("timestamps", 2, &[0.0, 0.005]);
+        let data = |rows: usize, value: f64| variable("imu_data", rows, &vec![value; rows * 6]);
+        let cases = [
+            (file(&[times.clone(), data(2, f64::NAN)]), "row 1, imu_data.1: NaN is not a finite number"),
+            (file(&[times.clone(), data(3, 1.0)]), "rows, other columns have "),
+            (file(&[times.clone()]), "not recognised from its variables ('timestamps')"),
+            (file(&[]), "not recognised from its variables ()"),
+            (file(&[variable("timestamps", 2, &[5.0, 1.0]), data(2, 1.0)]), "row 2: time runs backwards by 4.000 s"),
+        ];
+        for (bytes, expected) in cases {
+            let message = read(&bytes).unwrap_err();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

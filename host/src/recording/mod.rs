@@ -6,6 +6,8 @@
 pub mod axes;
 mod check;
 pub mod error;
+#[cfg(test)]
+mod fuzz;
 mod gaitmap;
 mod koroglu;
 pub mod mapping;
