@@ -8,6 +8,7 @@ use super::mapping::Mapping;
 use super::profile::{Preset, known};
 use super::table::{Collector, Places, listed};
 use super::{Recording, RecordingError, complete, named};
+use flate2::read::ZlibDecoder;
 use matfile::{MatFile, NumericData};
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -15,10 +16,16 @@ use std::path::Path;
 
 /// The first bytes of such a file.
 pub(super) const MAGIC: &[u8] = b"MATLAB 5.0 MAT-file";
+/// Those of the version after it, which is HDF5 inside.
+pub(super) const MAGIC_OF_LATER: &[u8] = b"MATLAB 7.3 MAT-file";
 /// Length of the text and the version at the start. **Units:** bytes.
 const HEADER: usize = 128;
 /// More columns in one variable are no table of a sensor.
 const MOST_COLUMNS: usize = 64;
+/// Length of an element's kind and length. **Units:** bytes.
+const TAG: usize = 8;
+/// No variable of a recording is larger. **Units:** bytes.
+const MOST_INFLATED: u64 = 1 << 30;
 /// Kinds of element that hold a variable: as it is, and compressed.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
@@ -57,36 +64,58 @@ fn parse(mut source: impl Read) -> Result<BTreeMap<String, Matrix>, Problem> {
     if !bytes.starts_with(MAGIC) {
         return Err(Problem::Malformed("not a MATLAB v5 file".into()));
     }
-    walk(&bytes)?;
+    let bytes = inflated(&bytes)?;
     let file = MatFile::parse(bytes.as_slice())
-        .map_err(|error| Problem::Malformed(format!("damaged MATLAB file: {error}")))?;
+        .map_err(|_| Problem::Malformed("damaged MATLAB file: a variable does not hold together".into()))?;
     Ok(file.arrays().iter().filter_map(|array| Some((array.name().to_owned(), matrix(array)?))).collect())
 }
 
-/// Checks that the elements fill the file exactly: the library takes the first damaged one for the end of the file.
-fn walk(bytes: &[u8]) -> Result<(), Problem> {
-    let cut =
-        |count: usize| Problem::Truncated(format!("the MATLAB file ends in the middle of variable {}", count + 1));
-    let order =
-        bytes.get(HEADER - 2..HEADER).ok_or_else(|| Problem::Truncated("the MATLAB file ends in its header".into()))?;
-    let word: fn([u8; 4]) -> u32 = match order {
-        b"IM" => u32::from_le_bytes,
-        b"MI" => u32::from_be_bytes,
+/// The same file with no variable compressed. The library is given nothing else, because it takes the first damaged
+/// element for the end of the file and prints what is wrong with a compressed one.
+fn inflated(bytes: &[u8]) -> Result<Vec<u8>, Problem> {
+    let (header, mut rest) = bytes
+        .split_at_checked(HEADER)
+        .ok_or_else(|| Problem::Truncated("the MATLAB file ends in its header".into()))?;
+    let word: fn([u8; 4]) -> u32 = match header {
+        [.., b'I', b'M'] => u32::from_le_bytes,
+        [.., b'M', b'I'] => u32::from_be_bytes,
         _ => return Err(Problem::Malformed("damaged MATLAB file: no byte order in its header".into())),
     };
-    let mut rest = &bytes[HEADER..];
-    let mut count = 0;
+    let mut out = header.to_vec();
+    let mut number = 0;
     while !rest.is_empty() {
-        let (kind, behind) = rest.split_first_chunk().ok_or_else(|| cut(count))?;
-        let (length, behind) = behind.split_first_chunk().ok_or_else(|| cut(count))?;
-        let (kind, length) = (word(*kind), word(*length) as usize);
-        if kind != MATRIX && kind != COMPRESSED {
-            return Err(Problem::Malformed(format!("damaged MATLAB file: variable {} is of kind {kind}", count + 1)));
+        number += 1;
+        let cut = || Problem::Truncated(format!("the MATLAB file ends in the middle of variable {number}"));
+        let strange = |kind| Problem::Malformed(format!("damaged MATLAB file: variable {number} is of kind {kind}"));
+        let (kind, length) = tag(rest, word).ok_or_else(cut)?;
+        let element = rest.get(..TAG + length).ok_or_else(cut)?;
+        match kind {
+            MATRIX => out.extend(element),
+            COMPRESSED => {
+                let start = out.len();
+                let mut decoder = ZlibDecoder::new(&element[TAG..]).take(MOST_INFLATED);
+                decoder.read_to_end(&mut out).map_err(|error| {
+                    Problem::Malformed(format!(
+                        "damaged MATLAB file: variable {number} cannot be decompressed ({error})"
+                    ))
+                })?;
+                match tag(&out[start..], word) {
+                    Some((MATRIX, length)) if out.len() - start >= TAG + length => {}
+                    Some((kind, _)) => return Err(strange(kind)),
+                    None => return Err(strange(0)),
+                }
+            }
+            other => return Err(strange(other)),
         }
-        rest = behind.get(length..).ok_or_else(|| cut(count))?;
-        count += 1;
+        rest = &rest[TAG + length..];
     }
-    Ok(())
+    Ok(out)
+}
+
+/// Kind and length of the element that begins here.
+fn tag(bytes: &[u8], word: fn([u8; 4]) -> u32) -> Option<(u32, usize)> {
+    let (kind, behind) = bytes.split_first_chunk()?;
+    Some((word(*kind), word(*behind.first_chunk()?) as usize))
 }
 
 fn matrix(array: &matfile::Array) -> Option<Matrix> {
@@ -160,6 +189,7 @@ pub(super) fn read(source: impl Read, mapping: Mapping) -> Result<Recording, Pro
 pub(super) mod tests {
     use super::*;
     use crate::recording;
+    use std::io::Write;
 
     /// One uncompressed variable of doubles.
     fn variable(name: &str, rows: usize, values: &[f64]) -> Vec<u8> {
@@ -196,6 +226,14 @@ pub(super) mod tests {
         file(&[variable("timestamps", rows, &times), variable("imu_data", rows, &data)])
     }
 
+    /// The same variable as MATLAB writes it by default.
+    fn compressed(variable: &[u8]) -> Vec<u8> {
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+        encoder.write_all(variable).unwrap();
+        let data = encoder.finish().unwrap();
+        [&COMPRESSED.to_le_bytes()[..], &(data.len() as u32).to_le_bytes(), &data].concat()
+    }
+
     fn read(bytes: &[u8]) -> Result<Recording, String> {
         recording::read("walk.mat".as_ref(), bytes, None).map_err(|error| error.to_string())
     }
@@ -205,6 +243,24 @@ pub(super) mod tests {
         let walk = read(&walk(30)).unwrap();
         assert_eq!(walk.samples.len(), 30);
         assert_eq!((walk.samples[7].time.0, walk.samples[7].accel.0.z, walk.samples[7].gyro.0.x), (35_000, 9.81, 0.01));
+    }
+
+    #[test]
+    fn compressed_variables_are_read_and_their_damage_is_noticed() {
+        let plain = walk(30);
+        let split = HEADER + variable("timestamps", 30, &[0.0; 30]).len();
+        let file = file(&[compressed(&plain[HEADER..split]), compressed(&plain[split..])]);
+        assert!(file.len() < plain.len());
+        assert_eq!(read(&file).unwrap().samples, read(&plain).unwrap().samples);
+        // Behind the header and the first tag every byte is under zlib's checksum or is a length.
+        for at in HEADER..file.len() {
+            let mut damaged = file.clone();
+            damaged[at] ^= 0x11;
+            let message = read(&damaged).unwrap_err();
+            assert!(["damaged", "truncated"].iter().any(|word| message.contains(word)), "{at}: {message}");
+        }
+        let nested = super::tests::file(&[compressed(&compressed(&plain[HEADER..split]))]);
+        assert!(read(&nested).unwrap_err().ends_with("damaged MATLAB file: variable 1 is of kind 15"));
     }
 
     #[test]
@@ -230,7 +286,7 @@ pub(super) mod tests {
         let cases = [
             (file(&[times.clone(), data(2, f64::NAN)]), "row 1, imu_data.1: NaN is not a finite number"),
             (file(&[times.clone(), data(3, 1.0)]), "rows, other columns have "),
-            (file(&[times.clone()]), "not recognised from its variables ('timestamps')"),
+            (file(std::slice::from_ref(&times)), "not recognised from its variables ('timestamps')"),
             (file(&[]), "not recognised from its variables ()"),
             (file(&[variable("timestamps", 2, &[5.0, 1.0]), data(2, 1.0)]), "row 2: time runs backwards by 4.000 s"),
         ];

@@ -139,6 +139,8 @@ pub fn read(path: &Path, source: impl Read, profile: Option<&Profile>) -> Result
     Ok(recording)
 }
 
+/// The first bytes of HDF5, which MATLAB uses since version 7.3.
+const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n";
 /// So much of a file is looked at to recognise its layout. **Units:** bytes.
 const HEAD: u64 = 1 << 16;
 
@@ -157,6 +159,9 @@ fn read_bytes(mut source: impl Read, mapping: Mapping) -> Result<Recording, Prob
     }
     if head.starts_with(mat::MAGIC) {
         return mat::read(rest, mapping);
+    }
+    if head.starts_with(mat::MAGIC_OF_LATER) || head.starts_with(HDF5_MAGIC) {
+        return Err(Problem::Malformed("a MATLAB 7.3 (HDF5) file, expected MATLAB v5: save it with '-v7'".into()));
     }
     if let Some(place) = head.iter().position(|&byte| byte == 0) {
         return Err(Problem::Malformed(format!("neither text nor MCAP nor MATLAB v5: a zero at byte {place}")));
