@@ -9,7 +9,7 @@
 //! The filter's world is the heading frame of the last re-base (see [`crate::step`]): origin at the foot, z up, and with
 //! each re-base turned by the turn of the foot since the one before. What the first one calls x is arbitrary.
 
-use super::state::{FREEDOMS, POSITION, ROTATION, State, VELOCITY};
+use super::state::{POSITION, ROTATION, State, VELOCITY};
 use crate::so3;
 use nalgebra::{Matrix3, Matrix3x2, Matrix4, SMatrix, UnitQuaternion, Vector3};
 
@@ -24,10 +24,15 @@ pub struct Change {
     pub covariance: Matrix4<f32>,
 }
 
-/// The change from the attitude `reference`, at the origin, to `state`. `covariance` is that of the state.
-pub fn change(reference: &UnitQuaternion<f32>, state: &State, covariance: &SMatrix<f32, FREEDOMS, FREEDOMS>) -> Change {
+/// The change from the attitude `reference`, at the origin, to `state`. `covariance` is that of the state; a filter may have
+/// more states behind these nine, which stay as they are.
+pub fn change<const N: usize>(
+    reference: &UnitQuaternion<f32>,
+    state: &State,
+    covariance: &SMatrix<f32, N, N>,
+) -> Change {
     // The error of the heading is the part of the rotation error about the vertical.
-    let mut reading = SMatrix::<f32, 4, FREEDOMS>::zeros();
+    let mut reading = SMatrix::<f32, 4, N>::zeros();
     reading.fixed_view_mut::<3, 3>(0, POSITION).copy_from(&Matrix3::identity());
     reading.fixed_view_mut::<1, 3>(3, ROTATION).copy_from(&state.up().transpose());
     let mut read = reading * covariance * reading.transpose();
@@ -40,7 +45,7 @@ pub fn change(reference: &UnitQuaternion<f32>, state: &State, covariance: &SMatr
 ///
 /// The covariance goes through the derivative of this change, so it stays positive. What was not known of the heading is
 /// not known of the direction of the velocity afterwards, and stays there.
-pub fn rebase(state: &mut State, covariance: &mut SMatrix<f32, FREEDOMS, FREEDOMS>, turn: f32) {
+pub fn rebase<const N: usize>(state: &mut State, covariance: &mut SMatrix<f32, N, N>, turn: f32) {
     let up = state.up();
     // What is left of a rotation error without its part about the vertical. As a product of the horizontal axes it has rank
     // two to rounding even where an axis of the sensor is almost vertical; 1 - up up^T has not.
@@ -49,7 +54,8 @@ pub fn rebase(state: &mut State, covariance: &mut SMatrix<f32, FREEDOMS, FREEDOM
     let back = so3::rotation_about_z(-turn);
     let back_matrix = back.to_rotation_matrix();
     let sideways = back * Vector3::z().cross(&state.velocity);
-    let mut derivative = SMatrix::<f32, FREEDOMS, FREEDOMS>::zeros();
+    let mut derivative = SMatrix::<f32, N, N>::identity();
+    derivative.fixed_view_mut::<3, 3>(POSITION, POSITION).fill(0.0);
     derivative.fixed_view_mut::<3, 3>(ROTATION, ROTATION).copy_from(&(horizontal * horizontal.transpose()));
     derivative.fixed_view_mut::<3, 3>(VELOCITY, ROTATION).copy_from(&(-sideways * up.transpose()));
     derivative.fixed_view_mut::<3, 3>(VELOCITY, VELOCITY).copy_from(back_matrix.matrix());
@@ -67,6 +73,7 @@ pub fn rebase(state: &mut State, covariance: &mut SMatrix<f32, FREEDOMS, FREEDOM
 mod tests {
     use super::*;
     use crate::filter::covariance::repaired_square_root;
+    use crate::filter::state::FREEDOMS;
     use proptest::prelude::*;
 
     type Covariance = SMatrix<f32, FREEDOMS, FREEDOMS>;

@@ -1,0 +1,518 @@
+//! The project's own filter: it knows that what stands on the floor is not the sensor but the foot below it.
+//!
+//! The sensor sits some centimetres above the point the standing foot turns about. A foot that rolls over it at some
+//! degrees per second moves the sensor by some centimetres per second, always forwards, and a zero-velocity update that
+//! does not know this takes one to two percent off every stride. This filter estimates the lever arm from that pivot to
+//! the sensor, and the update says that the pivot does not move.
+//!
+//! What else differs from [`super::unscented`], each for what it measures or costs:
+//!
+//! * It predicts from [`Increment`]s of some milliseconds, not from samples.
+//! * Only the attitude enters the prediction by a curved function, so only along its three axes sigma points are drawn (six,
+//!   one standard deviation out); all else is linear and exact. Zero velocity and height are linear: exact updates.
+//! * Biases of gyroscope and accelerometer are states.
+//! * What is lost between the samples of an impact enters as noise at that moment, and so is not smeared over the swing.
+//! * Zero velocity says next to nothing of the heading and of the gyroscope's bias about the vertical; what it seems to say
+//!   is mostly the rolling of the foot. Both are *considered* (Schmidt): their uncertainty counts, but they are corrected
+//!   by a part only, or not at all.
+//!
+//! # Frame
+//! World as in [`super::rebase`]; biases and lever arm in the sensor frame.
+//!
+//! # Source
+//! Sigma points of the attitude: first-order divided differences (Nørgaard, Poulsen, Ravn: "New developments in state
+//! estimation for nonlinear systems", Automatica 36, 2000). Consider states: Schmidt, "Application of state-space methods
+//! to navigation problems", Advances in Control Systems 3, 1966. Lever arm as a state: the project's own.
+
+use super::covariance::{repaired_square_root, symmetrise};
+use super::rebase::{self, Change};
+use super::state::{POSITION, ROTATION, State, VELOCITY};
+use crate::preintegration::Increment;
+use crate::sample::{AccelBias, GyroBias, STANDARD_GRAVITY_M_S2};
+use crate::so3;
+use crate::stance::adaptive::Speed;
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+/// Degrees of freedom of the error: rotation, position, velocity, gyroscope bias, accelerometer bias, lever arm.
+pub const FREEDOMS: usize = 18;
+/// First component of the gyroscope bias. **Units:** rad/s; **Frame:** sensor.
+const GYRO_BIAS: usize = 9;
+/// First component of the accelerometer bias. **Units:** m/s²; **Frame:** sensor.
+const ACCEL_BIAS: usize = 12;
+/// First component of the lever arm from the pivot to the sensor. **Units:** m; **Frame:** sensor.
+const LEVER: usize = 15;
+
+/// The covariance of the error.
+pub type Covariance = SMatrix<f32, FREEDOMS, FREEDOMS>;
+type Direction = SVector<f32, FREEDOMS>;
+
+/// Settings of [`PivotFilter`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Parameters {
+    /// Tilt at the start (standard deviation). **Units:** rad.
+    pub tilt_sigma: f32,
+    /// Tilt when the start was in motion. **Units:** rad.
+    pub tilt_sigma_moving: f32,
+    /// Velocity at the start. **Units:** m/s.
+    pub velocity_sigma: f32,
+    /// Gyroscope bias when no rest has shown it. **Units:** rad/s.
+    pub gyro_bias_sigma: f32,
+    /// Accelerometer bias. **Units:** m/s².
+    pub accel_bias_sigma: f32,
+    /// Lever arm. **Units:** m.
+    pub lever_sigma: f32,
+    /// Noise of the angular rate. **Units:** rad/s per square root of Hz.
+    pub gyro_noise: f32,
+    /// Noise of the specific force. **Units:** m/s² per square root of Hz.
+    pub accel_noise: f32,
+    /// Random walk of the gyroscope bias. **Units:** rad/s per square root of s.
+    pub gyro_bias_noise: f32,
+    /// Random walk of the accelerometer bias. **Units:** m/s² per square root of s.
+    pub accel_bias_noise: f32,
+    /// Random walk of the lever arm. **Units:** m per square root of s.
+    pub lever_noise: f32,
+    /// How long a jump between two samples may have been misjudged: times the jump, the noise it leaves. **Units:** s.
+    pub jump_s: f32,
+    /// What may be missing of a clipped angular rate. **Units:** rad/s.
+    pub gyro_clip_sigma: f32,
+    /// What may be missing of a clipped specific force. **Units:** m/s².
+    pub accel_clip_sigma: f32,
+    /// Angular rate that a hole in the samples may hide. **Units:** rad/s.
+    pub gap_gyro_sigma: f32,
+    /// Acceleration that a hole in the samples may hide. **Units:** m/s².
+    pub gap_accel_sigma: f32,
+    /// The part of a correction of the heading by zero velocity or height that is carried out, 0 to 1.
+    pub heading_share: f32,
+    /// The same for the gyroscope bias about the vertical.
+    pub vertical_bias_share: f32,
+    /// How well the specific force of a rest shows the vertical. **Units:** m/s².
+    pub gravity_sigma: f32,
+    /// How well the height of a level floor is known. **Units:** m.
+    pub height_sigma: f32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            tilt_sigma: 0.3_f32.to_radians(),
+            tilt_sigma_moving: 5.0_f32.to_radians(),
+            velocity_sigma: 0.01,
+            gyro_bias_sigma: 0.3_f32.to_radians(),
+            accel_bias_sigma: 0.1,
+            lever_sigma: 0.1,
+            gyro_noise: 0.003,
+            accel_noise: 0.03,
+            gyro_bias_noise: 1e-5,
+            accel_bias_noise: 1e-4,
+            lever_noise: 1e-4,
+            jump_s: 0.0015,
+            gyro_clip_sigma: 0.3,
+            accel_clip_sigma: 10.0,
+            gap_gyro_sigma: 2.0,
+            gap_accel_sigma: 5.0,
+            heading_share: 0.0,
+            vertical_bias_share: 0.0,
+            gravity_sigma: 0.05,
+            height_sigma: 0.003,
+        }
+    }
+}
+
+/// The filter.
+#[derive(Clone, Debug)]
+pub struct PivotFilter {
+    parameters: Parameters,
+    state: State,
+    gyro_bias: Vector3<f32>,
+    accel_bias: Vector3<f32>,
+    lever: Vector3<f32>,
+    /// Angular rate at the end of the last increment. **Units:** rad/s; **Frame:** sensor.
+    rate: Vector3<f32>,
+    covariance: Covariance,
+    /// Attitude at the last re-base.
+    reference: UnitQuaternion<f32>,
+    repaired: u32,
+}
+
+impl PivotFilter {
+    /// A filter that stands level in the origin.
+    pub fn new(parameters: &Parameters) -> Self {
+        let mut filter = Self {
+            parameters: *parameters,
+            state: State::at_rest(UnitQuaternion::identity()),
+            gyro_bias: Vector3::zeros(),
+            accel_bias: Vector3::zeros(),
+            lever: Vector3::zeros(),
+            rate: Vector3::zeros(),
+            covariance: Covariance::zeros(),
+            reference: UnitQuaternion::identity(),
+            repaired: 0,
+        };
+        filter.start(&Vector3::new(0.0, 0.0, STANDARD_GRAVITY_M_S2), None);
+        filter
+    }
+
+    /// Starts in the origin, standing, with the vertical along `accel`, the mean specific force. **Units:** m/s²;
+    /// **Frame:** sensor. `bias` is the mean angular rate of a rest and how well it shows the bias, or nothing when the
+    /// walk was on already.
+    ///
+    /// What the accelerometer shows beyond standard gravity is taken for its bias along the vertical: at rest, and in the
+    /// attitude of the standing foot, where it matters, bias, scale and the local gravity are one and the same.
+    pub fn start(&mut self, accel: &Vector3<f32>, bias: Option<(Vector3<f32>, f32)>) {
+        let p = self.parameters;
+        let attitude = so3::level(accel);
+        self.state = State::at_rest(attitude);
+        self.reference = attitude;
+        self.lever = Vector3::zeros();
+        self.rate = Vector3::zeros();
+        self.gyro_bias = bias.map_or_else(Vector3::zeros, |(rate, _)| rate);
+        let up = self.state.up();
+        let excess = accel.dot(&up) - STANDARD_GRAVITY_M_S2;
+        self.accel_bias = if bias.is_some() { up * excess } else { Vector3::zeros() };
+
+        let tilt = if bias.is_some() { p.tilt_sigma } else { p.tilt_sigma_moving };
+        let gyro_bias = bias.map_or(p.gyro_bias_sigma, |(_, sigma)| sigma.min(p.gyro_bias_sigma));
+        let sigmas = [
+            (ROTATION, tilt),
+            (VELOCITY, p.velocity_sigma),
+            (GYRO_BIAS, gyro_bias),
+            (ACCEL_BIAS, p.accel_bias_sigma),
+            (LEVER, p.lever_sigma),
+        ];
+        self.covariance = Covariance::zeros();
+        for (first, sigma) in sigmas {
+            for axis in first..first + 3 {
+                self.covariance[(axis, axis)] = sigma * sigma;
+            }
+        }
+        // The heading of the start is the origin of headings: known.
+        let known = Matrix3::identity() - up * up.transpose();
+        self.transform_block(ROTATION, &known);
+        symmetrise(&mut self.covariance);
+    }
+
+    /// Moves on by an increment.
+    pub fn predict(&mut self, increment: &Increment) {
+        let p = self.parameters;
+        let dt = increment.duration();
+        if increment.gap {
+            self.predict_gap(dt);
+            return;
+        }
+        let attitude = self.state.attitude;
+        let (velocity_turn, velocity) = self.turned(&increment.velocity);
+        let (position_turn, position) = self.turned(&increment.position);
+        let gravity = Vector3::new(0.0, 0.0, -STANDARD_GRAVITY_M_S2);
+        self.state.position += self.state.velocity * dt + position + gravity * (0.5 * dt * dt);
+        self.state.velocity += velocity + gravity * dt;
+        self.state.attitude = so3::renormalised(&(attitude * increment.turn));
+        self.rate = increment.gyro_mean();
+
+        let rotation = attitude.to_rotation_matrix();
+        let back = increment.turn.inverse().to_rotation_matrix();
+        self.propagate(back.matrix(), &velocity_turn, &position_turn, &(rotation.matrix() * -dt), dt);
+
+        let jump = p.jump_s * p.jump_s;
+        let gyro = p.gyro_noise * p.gyro_noise * dt
+            + jump * increment.gyro_jump
+            + p.gyro_clip_sigma * p.gyro_clip_sigma * increment.gyro_clipped;
+        let accel = p.accel_noise * p.accel_noise * dt
+            + jump * increment.accel_jump
+            + p.accel_clip_sigma * p.accel_clip_sigma * increment.accel_clipped;
+        self.add_noise(dt, gyro, accel);
+    }
+
+    /// A hole in the samples: the foot went on somehow.
+    fn predict_gap(&mut self, dt: f32) {
+        let p = self.parameters;
+        self.state.position += self.state.velocity * dt;
+        self.propagate(&Matrix3::identity(), &Matrix3::zeros(), &Matrix3::zeros(), &Matrix3::zeros(), dt);
+        let time = dt.min(LONGEST_GAP_S);
+        let squared = time * time;
+        self.add_noise(
+            dt,
+            p.gap_gyro_sigma * p.gap_gyro_sigma * squared,
+            p.gap_accel_sigma * p.gap_accel_sigma * squared,
+        );
+        let place = 0.5 * p.gap_accel_sigma * squared;
+        for axis in POSITION..POSITION + 3 {
+            self.covariance[(axis, axis)] += place * place;
+        }
+    }
+
+    /// `vector`, turned into the world by sigma points of the attitude: how it depends on the rotation error, and its mean.
+    fn turned(&self, vector: &Vector3<f32>) -> (Matrix3<f32>, Vector3<f32>) {
+        let mut derivative = Matrix3::zeros();
+        let mut mean = *vector;
+        for axis in 0..3 {
+            let variance = self.covariance[(ROTATION + axis, ROTATION + axis)];
+            let sigma = libm::sqrtf(variance.clamp(LEAST_SPREAD * LEAST_SPREAD, 1.0));
+            let mut offset = Vector3::zeros();
+            offset[axis] = sigma;
+            let out = so3::exp(&offset);
+            let (ahead, behind) = (out * vector, out.inverse() * vector);
+            derivative.set_column(axis, &((ahead - behind) / (2.0 * sigma)));
+            // Mean over the seven points, Foot 4.45.
+            mean += ((ahead - vector) + (behind - vector)) / 7.0;
+        }
+        let rotation = self.state.attitude.to_rotation_matrix();
+        (rotation.matrix() * derivative, rotation * mean)
+    }
+
+    /// `F P F^T` for the `F` of a prediction, which is the identity but for these blocks:
+    /// rotation from rotation `back` and gyroscope bias `-dt`; velocity from rotation and accelerometer bias; position from
+    /// rotation and velocity `dt`.
+    fn propagate(
+        &mut self,
+        back: &Matrix3<f32>,
+        velocity_turn: &Matrix3<f32>,
+        position_turn: &Matrix3<f32>,
+        velocity_bias: &Matrix3<f32>,
+        dt: f32,
+    ) {
+        let p = &mut self.covariance;
+        // Rows, then columns. Position first: it needs the others as they were.
+        let rotation = p.fixed_rows::<3>(ROTATION).into_owned();
+        let velocity = p.fixed_rows::<3>(VELOCITY).into_owned();
+        let row = p.fixed_rows::<3>(POSITION) + position_turn * rotation + velocity * dt;
+        p.fixed_rows_mut::<3>(POSITION).copy_from(&row);
+        let row = velocity + velocity_turn * rotation + velocity_bias * p.fixed_rows::<3>(ACCEL_BIAS);
+        p.fixed_rows_mut::<3>(VELOCITY).copy_from(&row);
+        let row = back * rotation - p.fixed_rows::<3>(GYRO_BIAS) * dt;
+        p.fixed_rows_mut::<3>(ROTATION).copy_from(&row);
+
+        let rotation = p.fixed_columns::<3>(ROTATION).into_owned();
+        let velocity = p.fixed_columns::<3>(VELOCITY).into_owned();
+        let column = p.fixed_columns::<3>(POSITION) + rotation * position_turn.transpose() + velocity * dt;
+        p.fixed_columns_mut::<3>(POSITION).copy_from(&column);
+        let column = velocity
+            + rotation * velocity_turn.transpose()
+            + p.fixed_columns::<3>(ACCEL_BIAS) * velocity_bias.transpose();
+        p.fixed_columns_mut::<3>(VELOCITY).copy_from(&column);
+        let column = rotation * back.transpose() - p.fixed_columns::<3>(GYRO_BIAS) * dt;
+        p.fixed_columns_mut::<3>(ROTATION).copy_from(&column);
+    }
+
+    fn add_noise(&mut self, dt: f32, rotation: f32, velocity: f32) {
+        let p = self.parameters;
+        let variances = [
+            (ROTATION, rotation),
+            (POSITION, POSITION_NOISE * dt),
+            (VELOCITY, velocity),
+            (GYRO_BIAS, p.gyro_bias_noise * p.gyro_bias_noise * dt),
+            (ACCEL_BIAS, p.accel_bias_noise * p.accel_bias_noise * dt),
+            (LEVER, p.lever_noise * p.lever_noise * dt),
+        ];
+        for (first, variance) in variances {
+            for axis in first..first + 3 {
+                self.covariance[(axis, axis)] += variance;
+            }
+        }
+        symmetrise(&mut self.covariance);
+    }
+
+    /// The pivot does not move (H2): the velocity of the sensor is what its turning about the pivot makes it. `sigma` is how
+    /// far from that it may be, **Units:** m/s. In an elevator (H5) only the horizontal velocity is known.
+    pub fn update_zero_velocity(&mut self, sigma: f32, horizontal_only: bool) {
+        let rotation = self.state.attitude.to_rotation_matrix();
+        let arm = rotation.matrix() * self.rate.cross_matrix();
+        let expected = arm * self.lever;
+        let mut correction = Direction::zeros();
+        for axis in 0..if horizontal_only { 2 } else { 3 } {
+            let mut reading = Direction::zeros();
+            reading[VELOCITY + axis] = 1.0;
+            for k in 0..3 {
+                reading[LEVER + k] = -arm[(axis, k)];
+            }
+            let innovation = expected[axis] - self.state.velocity[axis];
+            self.update(&reading, innovation, sigma * sigma, &mut correction, Considered::HeadingAndBias);
+        }
+        self.apply(&correction);
+    }
+
+    /// The elevator has stopped: no vertical velocity either. `sigma` in m/s.
+    pub fn update_zero_vertical_velocity(&mut self, sigma: f32) {
+        let mut reading = Direction::zeros();
+        reading[VELOCITY + 2] = 1.0;
+        let mut correction = Direction::zeros();
+        let innovation = -self.state.velocity.z;
+        self.update(&reading, innovation, sigma * sigma, &mut correction, Considered::HeadingAndBias);
+        self.apply(&correction);
+    }
+
+    /// The foot stands `height` above the last re-base (H4). **Units:** m. `part` is the part of the whole knowledge that
+    /// this update carries, when it is repeated.
+    pub fn update_height(&mut self, height: f32, part: f32) {
+        let sigma = self.parameters.height_sigma;
+        let mut reading = Direction::zeros();
+        reading[POSITION + 2] = 1.0;
+        let mut correction = Direction::zeros();
+        let innovation = height - self.state.position.z;
+        let variance = sigma * sigma / part.clamp(1e-3, 1.0);
+        self.update(&reading, innovation, variance, &mut correction, Considered::HeadingAndBias);
+        self.apply(&correction);
+    }
+
+    /// A rest: its mean rate is bias, its mean specific force the vertical (H1). **Units:** rad/s, m/s²; **Frame:** sensor;
+    /// both with the present biases taken out.
+    pub fn update_rest(&mut self, gyro: &Vector3<f32>, bias_sigma: f32, accel: &Vector3<f32>) {
+        let sigma = self.parameters.gravity_sigma;
+        let up = self.state.up() * STANDARD_GRAVITY_M_S2;
+        let turned = up.cross_matrix();
+        let mut correction = Direction::zeros();
+        for axis in 0..3 {
+            let mut reading = Direction::zeros();
+            reading[GYRO_BIAS + axis] = 1.0;
+            self.update(&reading, gyro[axis], bias_sigma * bias_sigma, &mut correction, Considered::Nothing);
+            let mut reading = Direction::zeros();
+            for k in 0..3 {
+                reading[ROTATION + k] = turned[(axis, k)];
+            }
+            reading[ACCEL_BIAS + axis] = 1.0;
+            self.update(&reading, accel[axis] - up[axis], sigma * sigma, &mut correction, Considered::Nothing);
+        }
+        self.apply(&correction);
+    }
+
+    /// One linear measurement `reading . error = innovation`. The correction is gathered, so that several measurements of
+    /// one moment see the same state.
+    fn update(
+        &mut self,
+        reading: &Direction,
+        innovation: f32,
+        variance: f32,
+        correction: &mut Direction,
+        considered: Considered,
+    ) {
+        let shared = self.covariance * reading;
+        let total = reading.dot(&shared) + variance;
+        if !(total > 0.0 && total.is_finite() && innovation.is_finite()) {
+            self.repair();
+            return;
+        }
+        let mut gain = shared / total;
+        if let Considered::HeadingAndBias = considered {
+            let up = self.state.up();
+            let shares = [(ROTATION, self.parameters.heading_share), (GYRO_BIAS, self.parameters.vertical_bias_share)];
+            for (first, share) in shares {
+                let part = gain.fixed_rows::<3>(first).dot(&up) * (1.0 - share);
+                for axis in 0..3 {
+                    gain[first + axis] -= up[axis] * part;
+                }
+            }
+        }
+        *correction += gain * (innovation - reading.dot(correction));
+        // Joseph's form, which holds for any gain: P - k (P h)^T - (P h) k^T + s k k^T.
+        for j in 0..FREEDOMS {
+            let (gain_j, shared_j) = (gain[j], shared[j]);
+            for i in j..FREEDOMS {
+                let less = gain[i] * shared_j + shared[i] * gain_j - total * gain[i] * gain_j;
+                self.covariance[(i, j)] -= less;
+                self.covariance[(j, i)] = self.covariance[(i, j)];
+            }
+        }
+        if (0..FREEDOMS).any(|i| self.covariance[(i, i)].is_nan() || self.covariance[(i, i)] < 0.0) {
+            self.repair();
+        }
+    }
+
+    fn apply(&mut self, correction: &Direction) {
+        let part = |first: usize| Vector3::new(correction[first], correction[first + 1], correction[first + 2]);
+        self.state.attitude = so3::box_plus(&self.state.attitude, &part(ROTATION));
+        self.state.position += part(POSITION);
+        self.state.velocity += part(VELOCITY);
+        self.gyro_bias += part(GYRO_BIAS);
+        self.accel_bias += part(ACCEL_BIAS);
+        self.lever += part(LEVER);
+    }
+
+    /// The change since the last re-base.
+    pub fn change(&self) -> Change {
+        rebase::change(&self.reference, &self.state, &self.covariance)
+    }
+
+    /// Makes the foot the new origin. Returns the change since the last one.
+    pub fn rebase(&mut self) -> Change {
+        let (_, repaired) = repaired_square_root(&mut self.covariance);
+        self.repaired += u32::from(repaired);
+        let change = self.change();
+        rebase::rebase(&mut self.state, &mut self.covariance, change.turn);
+        self.reference = self.state.attitude;
+        change
+    }
+
+    /// The vertical velocity is less certain than the filter believes, by `sigma`. **Units:** m/s.
+    pub fn loosen_vertical_velocity(&mut self, sigma: f32) {
+        self.covariance[(VELOCITY + 2, VELOCITY + 2)] += sigma * sigma;
+    }
+
+    fn repair(&mut self) {
+        super::covariance::repair(&mut self.covariance);
+        self.repaired = self.repaired.saturating_add(1);
+    }
+
+    fn transform_block(&mut self, first: usize, by: &Matrix3<f32>) {
+        let rows = by * self.covariance.fixed_rows::<3>(first);
+        self.covariance.fixed_rows_mut::<3>(first).copy_from(&rows);
+        let columns = self.covariance.fixed_columns::<3>(first) * by.transpose();
+        self.covariance.fixed_columns_mut::<3>(first).copy_from(&columns);
+    }
+
+    /// Attitude, position since the last re-base, velocity.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// The covariance of the error.
+    pub fn covariance(&self) -> &Covariance {
+        &self.covariance
+    }
+
+    /// Whether every value is a number.
+    pub fn is_finite(&self) -> bool {
+        let vectors = [self.state.position, self.state.velocity, self.gyro_bias, self.accel_bias, self.lever];
+        self.state.attitude.coords.iter().chain(vectors.iter().flatten()).all(|value| value.is_finite())
+    }
+
+    /// The speed of the foot; without doubt it has three standard deviations less.
+    pub fn speed(&self) -> Speed {
+        let variance: f32 = (VELOCITY..VELOCITY + 3).map(|axis| self.covariance[(axis, axis)].max(0.0)).sum();
+        let likely = libm::sqrtf(self.state.velocity.norm_squared());
+        Speed { likely, certain: (likely - 3.0 * libm::sqrtf(variance)).max(0.0) }
+    }
+
+    /// Gyroscope bias.
+    pub fn gyro_bias(&self) -> GyroBias {
+        GyroBias(self.gyro_bias)
+    }
+
+    /// Accelerometer bias.
+    pub fn accel_bias(&self) -> AccelBias {
+        AccelBias(self.accel_bias)
+    }
+
+    /// Lever arm from the pivot of the standing foot to the sensor. **Units:** m; **Frame:** sensor.
+    pub fn lever(&self) -> Vector3<f32> {
+        self.lever
+    }
+
+    /// How often the covariance had to be repaired.
+    pub fn repaired(&self) -> u32 {
+        self.repaired
+    }
+}
+
+/// What an update may not freely correct.
+#[derive(Clone, Copy)]
+enum Considered {
+    Nothing,
+    HeadingAndBias,
+}
+
+/// Sigma points are drawn at least this far out, so that their difference keeps its digits. **Units:** rad.
+const LEAST_SPREAD: f32 = 1e-3;
+/// Keeps the position from being known better than `f32` can say. **Units:** m²/s.
+const POSITION_NOISE: f32 = 1e-8;
+/// A hole hides no more than this: the foot comes to stand again. **Units:** s.
+const LONGEST_GAP_S: f32 = 2.0;
