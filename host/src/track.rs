@@ -2,6 +2,7 @@
 //!
 //! This is the dead-reckoned track, before any building, graph or fix corrects it.
 
+use nalgebra::Vector3;
 use sohle_shared::sample::ImuSample;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
@@ -59,8 +60,11 @@ impl Track {
             if let Some(step) = output.step {
                 track.add(step);
             }
+            if let Some(stance) = track.stances.last_mut().filter(|_| output.reported) {
+                stance.end = sample.time;
+            }
             if due.is_none_or(|due| sample.time >= due) {
-                track.path.push(PathPoint { time: sample.time, position: tracker.position() });
+                track.path.push(PathPoint { time: sample.time, position: track.ahead(tracker.displacement()) });
                 due = Some(sample.time + PATH_PERIOD_US);
             }
         }
@@ -73,18 +77,23 @@ impl Track {
 
     /// Appends a step to the end of the track.
     pub fn add(&mut self, step: Step) {
-        let last = self.stances.last();
-        let heading = last.map_or(0.0, |stance| stance.heading);
-        let origin = last.map_or([0.0; 3], |stance| stance.position);
-        let (sin, cos) = heading.sin_cos();
-        let [x, y, z] = [0, 1, 2].map(|axis| f64::from(step.displacement[axis]));
+        let heading = self.stances.last().map_or(0.0, |stance| stance.heading);
         self.stances.push(Stance {
             start: step.stance_start,
             end: step.stance_end,
-            position: [origin[0] + cos * x - sin * y, origin[1] + sin * x + cos * y, origin[2] + z],
+            position: self.ahead(step.displacement),
             heading: heading + f64::from(step.turn),
         });
         self.steps.push(step);
+    }
+
+    /// The place that lies at `displacement` in the heading frame of the last stance. **Units:** m.
+    fn ahead(&self, displacement: Vector3<f32>) -> [f64; 3] {
+        let last = self.stances.last();
+        let origin = last.map_or([0.0; 3], |stance| stance.position);
+        let (sin, cos) = libm::sincos(last.map_or(0.0, |stance| stance.heading));
+        let [x, y, z] = [0, 1, 2].map(|axis| f64::from(displacement[axis]));
+        [origin[0] + cos * x - sin * y, origin[1] + sin * x + cos * y, origin[2] + z]
     }
 
     /// Strides walked: the start is not one.

@@ -205,7 +205,7 @@ mod tests {
         let increments = gather(&samples);
         let holes: Vec<_> = increments.iter().filter(|increment| increment.gap).collect();
         assert_eq!(holes.len(), 1);
-        assert_eq!((holes[0].start, holes[0].end), (Micros(395_000), Micros(700_000)));
+        assert_eq!((holes[0].start, holes[0].end), (Micros(390_000), Micros(700_000)));
         assert_eq!(holes[0].velocity, Vector3::zeros());
     }
 

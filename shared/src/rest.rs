@@ -34,7 +34,7 @@ impl Default for Parameters {
             accel_sigma: 0.15,
             gyro_mean: 2.0_f32.to_radians(),
             bias_sigma: 0.02_f32.to_radians(),
-            bias_share: 0.2,
+            bias_share: 0.3,
         }
     }
 }
@@ -60,21 +60,19 @@ const MINIMUM: usize = 8;
 pub struct RestDetector {
     parameters: Parameters,
     window: Window<6, CAPACITY>,
-    since: Option<Micros>,
 }
 
 impl RestDetector {
     /// A detector that has seen nothing.
     pub fn new(parameters: &Parameters) -> Self {
-        Self { parameters: *parameters, window: Window::over(parameters.window_s, MINIMUM), since: None }
+        Self { parameters: *parameters, window: Window::over(parameters.window_s, MINIMUM) }
     }
 
     /// Takes in what the sensor showed on average over some milliseconds, and tells of a rest that ends now. `spread` scales
     /// what may vary: 1 for a rest, more for the best that could be had.
     pub fn push(&mut self, time: Micros, accel: &Vector3<f32>, gyro: &Vector3<f32>, spread: f32) -> Option<Rest> {
         self.window.push(time, [accel.x, accel.y, accel.z, gyro.x, gyro.y, gyro.z]);
-        let since = *self.since.get_or_insert(time);
-        if !self.window.is_complete() || time.since(since) < self.parameters.window_s {
+        if !self.window.is_complete() {
             return None;
         }
         let p = &self.parameters;
@@ -87,14 +85,13 @@ impl RestDetector {
         if gyro_sigma > p.gyro_sigma * spread || accel_sigma > p.accel_sigma * spread || turns {
             return None;
         }
-        self.since = Some(time);
+        self.window.clear();
         Some(Rest { gyro, accel: Vector3::new(ax, ay, az), bias_sigma: p.bias_sigma + p.bias_share * gyro_sigma })
     }
 
     /// Forgets everything seen.
     pub fn reset(&mut self) {
         self.window.clear();
-        self.since = None;
     }
 }
 
@@ -114,7 +111,7 @@ mod tests {
 
     #[test]
     fn ten_seconds_of_rest_are_nineteen_rests() {
-        // The first half second only fills the window.
+        // Each takes half a second and the one increment more that completes it.
         assert_eq!(rests(10, |_| (Vector3::new(0.0, 0.0, 9.8), Vector3::new(0.01, -0.02, 0.0))), 19);
     }
 

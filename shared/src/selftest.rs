@@ -284,8 +284,8 @@ pub fn track(
         report.samples += 1;
         report.standing += u32::from(output.stance);
         report.fingerprint.word(output.state as u32 * 2 + u32::from(output.stance));
-        for coordinate in tracker.position() {
-            report.fingerprint.wide(coordinate.to_bits());
+        for coordinate in &tracker.displacement() {
+            report.fingerprint.word(coordinate.to_bits());
         }
         report.take(output.step);
     }

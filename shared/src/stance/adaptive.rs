@@ -6,7 +6,7 @@
 //!
 //! * The velocity of the standing foot is held to zero the less, the more restless the moment is compared with that
 //!   ([`Verdict::velocity_sigma`]): there is no edge at which a wrong decision could do harm.
-//! * The stance itself begins below a small multiple of it and ends when the foot is restless *and* moves.
+//! * The stance itself begins below a small multiple of it and ends above a larger one.
 //! * When the pace rises, the stillest moment of the new pace is a local minimum of the statistic at which the filter says
 //!   that the foot hardly moves. In a swing there are local minima too, but the foot moves at metres per second. The
 //!   speed that the filter is certain of tells them apart.
@@ -41,7 +41,7 @@ pub struct Parameters {
     pub velocity_sigma: f32,
     /// A stance begins below this multiple of the stillest moment. **Units:** 1.
     pub enter: f32,
-    /// A stance ends above this multiple, if the foot moves. **Units:** 1.
+    /// A stance ends above this multiple. **Units:** 1.
     pub leave: f32,
     /// Time below `enter` after which it is a stance. **Units:** s.
     pub confirm_s: f32,
@@ -64,7 +64,7 @@ impl Default for Parameters {
             limit: 3e5,
             velocity_sigma: 0.01,
             enter: 3.0,
-            leave: 10.0,
+            leave: 6.0,
             confirm_s: 0.04,
             swing_speed: 0.4,
             new_pace_speed: 0.2,
@@ -73,8 +73,15 @@ impl Default for Parameters {
     }
 }
 
-/// Beyond this multiple of the limit the foot does not stand, whatever the filter believes of its speed.
-const RESTLESS: f32 = 10.0;
+/// What a filter knows of the speed of the foot. **Units:** m/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speed {
+    /// The most likely speed.
+    pub likely: f32,
+    /// The speed the foot has without doubt.
+    pub certain: f32,
+}
+
 /// Parts that the time looked back over is cut into.
 const PARTS: usize = 16;
 
@@ -89,6 +96,8 @@ pub struct Adaptive {
     last: Option<(Micros, f32)>,
     before: f32,
     standing: bool,
+    /// The foot has certainly moved since it last stood.
+    swung: bool,
     calm_since: Option<Micros>,
     stood_until: Option<Micros>,
 }
@@ -109,6 +118,7 @@ impl Adaptive {
             last: None,
             before: f32::INFINITY,
             standing: false,
+            swung: true,
             calm_since: None,
             stood_until: None,
         }
@@ -136,9 +146,8 @@ impl Adaptive {
         least.clamp(self.parameters.floor, self.parameters.ceiling)
     }
 
-    /// Judges the moment `time` from its statistic and, if there is a filter that knows it, from the speed at which the foot
-    /// moves without doubt. **Units:** m/s.
-    pub fn judge(&mut self, time: Micros, statistic: f32, speed: Option<f32>) -> Verdict {
+    /// Judges the moment `time` from its statistic and, if there is a filter that knows it, from the speed of the foot.
+    pub fn judge(&mut self, time: Micros, statistic: f32, speed: Option<Speed>) -> Verdict {
         let p = self.parameters;
         if !statistic.is_finite() {
             *self = Self { shoe: self.shoe.clone(), ..Self::new(&p) };
@@ -148,13 +157,16 @@ impl Adaptive {
         self.remember(time, statistic);
         let stillest = self.stillest();
 
-        let swings = speed.is_some_and(|speed| speed > p.swing_speed);
+        let swings = speed.is_some_and(|speed| speed.certain > p.swing_speed);
         if self.standing {
-            let moves = swings || speed.is_none() || statistic > RESTLESS * p.limit;
-            if statistic > p.leave * stillest && moves {
+            if statistic > p.leave * stillest {
                 self.standing = false;
                 self.calm_since = None;
             }
+        } else if statistic < p.leave * stillest && speed.is_some() && !self.swung {
+            // The foot has not gone anywhere: it was a restless moment of the same stance.
+            self.calm_since = Some(time);
+            self.standing = true;
         } else if statistic < (p.enter * stillest).min(p.limit) && !swings {
             let since = *self.calm_since.get_or_insert(time);
             self.standing = time - since >= (p.confirm_s * 1e6) as i64;
@@ -164,6 +176,7 @@ impl Adaptive {
         if self.standing {
             self.stood_until = Some(time);
         }
+        self.swung = swings || (self.swung && !self.standing);
         self.before = self.last.map_or(f32::INFINITY, |(_, statistic)| statistic);
         self.last = Some((time, statistic));
 
@@ -180,15 +193,17 @@ impl Adaptive {
     }
 
     /// The last moment was a local minimum, the foot hardly moved, and a stance is due: the person goes at a quicker pace.
-    fn look_for_a_new_pace(&mut self, statistic: f32, speed: Option<f32>) {
+    fn look_for_a_new_pace(&mut self, statistic: f32, speed: Option<Speed>) {
         let p = &self.parameters;
         let (Some((time, least)), Some(speed)) = (self.last, speed) else { return };
         let due = !self.standing && self.stood_until.is_none_or(|until| time.since(until) > p.new_pace_after_s);
         let minimum = least <= self.before && least <= statistic;
-        if due && minimum && least < p.limit && least > 2.0 * self.stillest() && speed < p.new_pace_speed {
+        if due && minimum && least < p.limit && least > 2.0 * self.stillest() && speed.likely < p.new_pace_speed {
             self.least = [f32::INFINITY; PARTS];
             self.least[PARTS - 1] = least;
             self.calm_since = Some(time);
+            // The speed confirms it; a runner's stance is too short to wait for more.
+            self.standing = true;
         }
     }
 
@@ -227,6 +242,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn at(speed: f32) -> Option<Speed> {
+        Some(Speed { likely: speed, certain: speed })
+    }
+
     /// Statistic and speed of strides of `stride` seconds whose stance, 0.3 of each, is as restless as `least`.
     fn stride(t: f32, stride: f32, least: f32) -> (f32, f32) {
         let phase = t / stride - libm::floorf(t / stride);
@@ -246,7 +265,7 @@ mod tests {
         for &(length, least, strides) in paces {
             for i in 0..(length * 100.0 * strides as f32) as i64 {
                 let (statistic, speed) = stride(i as f32 * 0.01, length, least);
-                let verdict = detector.judge(Micros(time), statistic, Some(speed));
+                let verdict = detector.judge(Micros(time), statistic, at(speed));
                 count += usize::from(verdict.stance && !stood);
                 stood = verdict.stance;
                 time += 10_000;
@@ -263,19 +282,19 @@ mod tests {
     #[test]
     fn standing_for_long_is_one_stance() {
         let mut detector = Adaptive::new(&Parameters::default());
-        let stood = (0..2000).filter(|&i| detector.judge(Micros(i * 10_000), 5.0, Some(0.01)).stance).count();
+        let stood = (0..2000).filter(|&i| detector.judge(Micros(i * 10_000), 5.0, at(0.01)).stance).count();
         assert_eq!(stood, 1996);
     }
 
     #[test]
     fn a_restless_moment_holds_the_velocity_less() {
         let mut detector = Adaptive::new(&Parameters::default());
-        let still = detector.judge(Micros(0), 4e3, Some(0.0)).velocity_sigma.unwrap();
-        let restless = detector.judge(Micros(10_000), 2e4, Some(0.0)).velocity_sigma.unwrap();
+        let still = detector.judge(Micros(0), 4e3, at(0.0)).velocity_sigma.unwrap();
+        let restless = detector.judge(Micros(10_000), 2e4, at(0.0)).velocity_sigma.unwrap();
         assert!((still - 0.01).abs() < 1e-6);
         assert!((restless - 0.64).abs() < 1e-4);
-        assert_eq!(detector.judge(Micros(20_000), 4e5, Some(0.0)).velocity_sigma, None);
-        assert_eq!(detector.judge(Micros(30_000), 4e3, Some(2.0)).velocity_sigma, None);
+        assert_eq!(detector.judge(Micros(20_000), 4e5, at(0.0)).velocity_sigma, None);
+        assert_eq!(detector.judge(Micros(30_000), 4e3, at(2.0)).velocity_sigma, None);
     }
 
     proptest! {
@@ -283,8 +302,8 @@ mod tests {
         fn a_calmer_moment_never_holds_less(a in 1.0_f32..2.9e5, b in 1.0_f32..2.9e5) {
             let sigma = |statistic| {
                 let mut detector = Adaptive::new(&Parameters::default());
-                detector.judge(Micros(0), 3e3, Some(0.0));
-                detector.judge(Micros(10_000), statistic, Some(0.0)).velocity_sigma.unwrap()
+                detector.judge(Micros(0), 3e3, at(0.0));
+                detector.judge(Micros(10_000), statistic, at(0.0)).velocity_sigma.unwrap()
             };
             let (calmer, other) = if a < b { (a, b) } else { (b, a) };
             prop_assert!(sigma(calmer) <= sigma(other));
