@@ -1,6 +1,7 @@
 //! The laptop's side of Sohle: recordings, simulation, tracks, scores.
 
 pub mod cli;
+pub mod evaluation;
 pub mod export;
 pub mod recording;
 pub mod track;
