@@ -7,6 +7,7 @@
 
 pub mod convert;
 mod error;
+pub mod evaluate;
 pub mod parameters;
 
 pub use error::Error;
@@ -29,6 +30,7 @@ pub struct Cli {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     Convert(convert::Args),
+    Evaluate(evaluate::Args),
     Parameters(parameters::Args),
 }
 
@@ -36,6 +38,7 @@ enum Command {
 fn dispatch(command: Command) -> Result<(), Error> {
     match command {
         Command::Convert(args) => convert::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
         Command::Parameters(args) => parameters::run(args),
     }
 }
