@@ -4,4 +4,5 @@ pub mod cli;
 pub mod evaluation;
 pub mod export;
 pub mod recording;
+pub mod simulation;
 pub mod track;

@@ -9,6 +9,7 @@ pub mod convert;
 mod error;
 pub mod evaluate;
 pub mod parameters;
+pub mod simulate;
 
 pub use error::Error;
 
@@ -32,6 +33,7 @@ enum Command {
     Convert(convert::Args),
     Evaluate(evaluate::Args),
     Parameters(parameters::Args),
+    Simulate(simulate::Args),
 }
 
 /// Runs the command.
@@ -40,6 +42,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Parameters(args) => parameters::run(args),
+        Command::Simulate(args) => simulate::run(args),
     }
 }
 
