@@ -181,7 +181,7 @@ fn rate(samples: &[ImuSample], mapping: &Mapping) -> Result<(), Problem> {
         .min_by(|one, other| distance(one).total_cmp(&distance(other)));
     let hint = hint(fitting.map(|unit| unit.to_string()));
     Err(Problem::Unit(format!(
-        "the time taken as {stated} gives a sample every {period} s, expected {} to {} Hz{hint}",
+        "the time taken as {stated} gives a sample every {period:.6} s, expected {} to {} Hz{hint}",
         RATES_HZ.start(),
         RATES_HZ.end()
     )))

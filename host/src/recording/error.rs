@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// A recording could not be read or written: which one, and why.
 #[derive(Debug, Error)]
-#[error("{}: {problem}", path.display())]
+#[error("{}", one_line(&format!("{}: {problem}", path.display())))]
 pub struct RecordingError {
     /// The file.
     pub path: PathBuf,
@@ -85,6 +85,11 @@ fn said(error: &io::Error) -> String {
     }
 }
 
+/// Names from a file may hold anything; a message holds no control characters.
+fn one_line(message: &str) -> String {
+    message.replace(char::is_control, "\u{fffd}")
+}
+
 /// A profile could not be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -116,4 +121,17 @@ pub enum ProfileError {
     /// A mapping inside another file contradicts itself.
     #[error("mapping: {0}")]
     Mapping(String),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_usual_refusals_have_plain_names() {
+        let told = |kind| RecordingError { path: "walk.csv".into(), problem: io::Error::from(kind).into() }.to_string();
+        assert_eq!(told(io::ErrorKind::PermissionDenied), "walk.csv: no permission");
+        assert_eq!(told(io::ErrorKind::NotFound), "walk.csv: no such file or directory");
+        assert_eq!(told(io::ErrorKind::TimedOut), "walk.csv: timed out");
+    }
 }

@@ -222,8 +222,7 @@ impl Table {
 /// The beginning of a field, fit for a message.
 fn excerpt(field: &[u8]) -> String {
     let text = String::from_utf8_lossy(field);
-    let mut shown: String =
-        text.chars().take(20).map(|sign| if sign.is_control() { '\u{fffd}' } else { sign }).collect();
+    let mut shown: String = text.chars().take(20).collect();
     if text.chars().nth(20).is_some() {
         shown.push('…');
     }
