@@ -109,7 +109,7 @@ impl Default for Parameters {
             jump_s: 0.0015,
             gyro_clip_sigma: 0.3,
             accel_clip_sigma: 10.0,
-            gap_gyro_sigma: 2.0,
+            gap_gyro_sigma: 1.0,
             gap_accel_sigma: 5.0,
             heading_share: 0.0,
             vertical_bias_share: 0.0,

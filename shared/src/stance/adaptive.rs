@@ -113,7 +113,8 @@ impl Adaptive {
         Self {
             parameters: *parameters,
             shoe: Shoe::new(&statistic),
-            least: [f32::INFINITY; PARTS],
+            // Nothing seen yet: someone may have stood still.
+            least: [0.0; PARTS],
             part_start: None,
             last: None,
             before: f32::INFINITY,
@@ -212,7 +213,7 @@ impl Adaptive {
         let start = *self.part_start.get_or_insert(time);
         let passed = time - start;
         if passed < 0 || passed >= part * (PARTS as i64 + 1) {
-            self.least = [f32::INFINITY; PARTS];
+            self.least = [0.0; PARTS];
             self.part_start = Some(time);
         } else {
             for _ in 0..passed / part {

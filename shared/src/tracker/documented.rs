@@ -219,6 +219,7 @@ impl Documented {
     ) -> Option<Step> {
         let state = self.filter.state();
         let height = POSITION + 2;
+        let stood_on = self.ground.mode();
         let finding = self.ground.observe(&Sight {
             dt,
             standing: self.standing_since.map(|since| time.since(since)),
@@ -240,12 +241,17 @@ impl Documented {
             self.steps.reopen();
         }
         let event = self.steps.observe(time, self.standing_since, verdict.statistic, !verdict.stance);
-        if event == Event::Complete && !finding.riding { self.complete(counters) } else { None }
+        if event == Event::Complete && !finding.riding {
+            let mode = if self.standing_since.is_some() { finding.mode } else { stood_on };
+            self.complete(mode, counters)
+        } else {
+            None
+        }
     }
 
-    fn complete(&mut self, counters: &mut Counters) -> Option<Step> {
+    /// The step of a stance on ground of this kind.
+    fn complete(&mut self, mode: FloorMode, counters: &mut Counters) -> Option<Step> {
         let change = self.filter.rebase();
-        let mode = self.ground.mode();
         self.ground.rebased();
         counters.repaired = self.filter.repaired();
         if self.filter.repaired() != self.repaired {
@@ -257,7 +263,7 @@ impl Documented {
 
     pub(super) fn finish(&mut self, counters: &mut Counters) -> Option<Step> {
         match self.steps.finish() {
-            Event::Complete => self.complete(counters),
+            Event::Complete => self.complete(self.ground.mode(), counters),
             Event::None => None,
         }
     }

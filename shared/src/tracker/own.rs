@@ -19,6 +19,8 @@ use nalgebra::Vector3;
 
 /// A zero-velocity update weaker than this says nothing. **Units:** m/s.
 const WEAKEST_UPDATE: f32 = 5.0;
+/// A foot more restless than this swings, or is struck. **Units:** 1, the SHOE statistic.
+const SWING_STATISTIC: f32 = 1e6;
 /// A foot that seems faster has been lost; the tracker starts anew. **Units:** m/s.
 const LOST_SPEED: f32 = 30.0;
 /// What a rest that starts the tracker may vary more than one later on: nothing better may come.
@@ -34,7 +36,7 @@ const STOP_SIGMA: f32 = 0.01;
 #[derive(Clone, Debug)]
 pub(super) struct Own {
     start_after_s: f32,
-    confirm_swing: f32,
+    swing_speed: f32,
     preintegrator: Preintegrator,
     /// The two increments before the newest.
     ring: [Option<Increment>; 2],
@@ -53,7 +55,7 @@ impl Own {
     pub(super) fn new(p: &Parameters) -> Self {
         Self {
             start_after_s: p.start_after_s,
-            confirm_swing: p.stance.swing_speed,
+            swing_speed: p.stance.swing_speed,
             preintegrator: Preintegrator::new(&p.preintegration),
             ring: [None; 2],
             detector: Adaptive::new(&p.stance),
@@ -150,6 +152,7 @@ impl Own {
         let state = self.filter.state();
         let acceleration = (state.attitude * increment.accel_mean()).z - STANDARD_GRAVITY_M_S2;
         let height = POSITION + 2;
+        let stood_on = self.ground.mode();
         let finding = self.ground.observe(&Sight {
             dt,
             standing: since.map(|since| increment.end.since(since)),
@@ -161,8 +164,16 @@ impl Own {
         });
         self.correct(&increment, verdict.velocity_sigma, &finding, dt);
 
-        let event = self.steps.observe(increment.end, since, statistic, speed.certain > self.confirm_swing);
-        let step = if event == Event::Complete && !finding.riding { self.complete(counters) } else { None };
+        // Where the filter is in doubt, as after a hole, a swing shows by its restlessness.
+        let swings = speed.certain > self.swing_speed
+            || (speed.likely > self.swing_speed && statistic > SWING_STATISTIC && statistic.is_finite());
+        let event = self.steps.observe(increment.end, since, statistic, swings);
+        let step = if event == Event::Complete && !finding.riding {
+            let mode = if since.is_some() { finding.mode } else { stood_on };
+            self.complete(mode, counters)
+        } else {
+            None
+        };
 
         if !self.filter.is_finite() || self.filter.state().velocity.norm_squared() > LOST_SPEED * LOST_SPEED {
             counters.restarts += 1;
@@ -198,9 +209,9 @@ impl Own {
         }
     }
 
-    fn complete(&mut self, counters: &mut Counters) -> Option<Step> {
+    /// The step of a stance on ground of this kind.
+    fn complete(&mut self, mode: FloorMode, counters: &mut Counters) -> Option<Step> {
         let change = self.filter.rebase();
-        let mode = self.ground.mode();
         self.ground.rebased();
         counters.repaired = self.filter.repaired();
         if self.filter.repaired() != self.repaired {
@@ -212,7 +223,7 @@ impl Own {
 
     pub(super) fn finish(&mut self, counters: &mut Counters) -> Option<Step> {
         match self.steps.finish() {
-            Event::Complete => self.complete(counters),
+            Event::Complete => self.complete(self.ground.mode(), counters),
             Event::None => None,
         }
     }
