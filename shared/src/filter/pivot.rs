@@ -516,3 +516,214 @@ const LEAST_SPREAD: f32 = 1e-3;
 const POSITION_NOISE: f32 = 1e-8;
 /// A hole hides no more than this: the foot comes to stand again. **Units:** s.
 const LONGEST_GAP_S: f32 = 2.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::covariance::{repair, square_root};
+    use crate::preintegration::{self, Preintegrator};
+    use crate::sample::ImuSample;
+    use crate::time::Micros;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const UP: Vector3<f32> = Vector3::new(0.0, 0.0, STANDARD_GRAVITY_M_S2);
+
+    fn started(accel: &Vector3<f32>) -> PivotFilter {
+        let mut filter = PivotFilter::new(&Parameters::default());
+        filter.start(accel, Some((Vector3::zeros(), 4e-4)));
+        filter
+    }
+
+    /// Increments of a sensor that rocks about a pivot at rest: angle `0.1 sin 5 t` about y. `lever` from the pivot.
+    fn rocking(lever: &Vector3<f32>, seconds: f32) -> Vec<Increment> {
+        let mut integrator = Preintegrator::new(&preintegration::Parameters::default());
+        (0..(seconds * 500.0) as i64)
+            .filter_map(|i| {
+                let t = i as f32 * 0.002;
+                let (sin, cos) = libm::sincosf(5.0 * t);
+                let turned = so3::exp(&Vector3::new(0.0, 0.1 * sin, 0.0));
+                let rate = Vector3::new(0.0, 0.5 * cos, 0.0);
+                let change = Vector3::new(0.0, -2.5 * sin, 0.0);
+                let accel = turned.inverse() * UP + change.cross(lever) + rate.cross(&rate.cross(lever));
+                let sample = ImuSample::new(Micros(i * 2_000), accel.into(), rate.into());
+                integrator.push(&sample, GyroBias::zero(), AccelBias::zero())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_lever_arm_is_found_where_the_rocking_shows_it() {
+        let lever = Vector3::new(0.04, 0.0, 0.09);
+        let mut filter = started(&UP);
+        for increment in rocking(&lever, 20.0) {
+            filter.predict(&increment);
+            filter.update_zero_velocity(0.01, false);
+        }
+        // 20 s of a sensor without noise; the axis of the rocking itself shows nothing.
+        let error = filter.lever() - lever;
+        assert!(error.x.abs() < 0.004 && error.z.abs() < 0.004, "{:?}", filter.lever());
+        assert!(filter.covariance()[(LEVER + 2, LEVER + 2)] < 1e-4);
+        assert!(filter.covariance()[(LEVER + 1, LEVER + 1)] > 5e-3);
+    }
+
+    #[test]
+    fn the_prediction_is_the_derivative_of_the_motion() {
+        let mut filter = started(&Vector3::new(1.0, 2.0, 9.0));
+        filter.state.velocity = Vector3::new(1.0, -0.5, 0.3);
+        let increment = Increment {
+            turn: so3::exp(&Vector3::new(0.02, -0.05, 0.03)),
+            velocity: Vector3::new(0.2, -0.1, 0.15),
+            position: Vector3::new(0.001, -0.0005, 0.0008),
+            ..rocking(&Vector3::zeros(), 0.1)[0]
+        };
+        let dt = increment.duration();
+        let moved = |filter: &PivotFilter, gyro: Vector3<f32>, accel: Vector3<f32>| {
+            let mut next = filter.clone();
+            let mut increment = increment;
+            increment.turn *= so3::exp(&(-gyro * dt));
+            increment.velocity -= accel * dt;
+            next.predict(&increment);
+            next.state
+        };
+        let nominal = moved(&filter, Vector3::zeros(), Vector3::zeros());
+        // Column by column, by a small step in each error.
+        let mut expected = Covariance::identity();
+        for column in 0..LEVER {
+            let mut changed = filter.clone();
+            let mut direction = Direction::zeros();
+            let size = 0.02;
+            direction[column] = size;
+            let (mut gyro, mut accel) = (Vector3::zeros(), Vector3::zeros());
+            if (GYRO_BIAS..ACCEL_BIAS).contains(&column) {
+                gyro[column - GYRO_BIAS] = size;
+            } else if column >= ACCEL_BIAS {
+                accel[column - ACCEL_BIAS] = size;
+            } else {
+                changed.apply(&direction);
+            }
+            let difference = moved(&changed, gyro, accel).box_minus(&nominal) / size;
+            for row in 0..GYRO_BIAS {
+                expected[(row, column)] = difference[row];
+            }
+        }
+        let before = Covariance::from_fn(|i, j| if i == j { 1.0 } else { 0.01 * ((i + j) % 7) as f32 });
+        filter.covariance = before;
+        let predicted = {
+            let (velocity_turn, _) = filter.turned(&increment.velocity);
+            let (position_turn, _) = filter.turned(&increment.position);
+            let rotation = filter.state.attitude.to_rotation_matrix();
+            let back = increment.turn.inverse().to_rotation_matrix();
+            filter.propagate(back.matrix(), &velocity_turn, &position_turn, &(rotation.matrix() * -dt), dt);
+            filter.covariance
+        };
+        let wanted = expected * before * expected.transpose();
+        // Sigma points one radian out against a derivative: sin(1) for 1 in what the rotation (0.25 m/s) does.
+        assert!((predicted - wanted).amax() < 0.25 * 0.25, "{}", (predicted - wanted).amax());
+        let linear = |m: &Covariance| m.fixed_view::<12, 12>(VELOCITY, VELOCITY).into_owned();
+        assert!((linear(&predicted) - linear(&wanted)).fixed_view::<9, 9>(3, 3).amax() < 1e-4);
+    }
+
+    #[test]
+    fn zero_velocity_leaves_the_heading_and_its_bias_alone() {
+        let mut filter = started(&UP);
+        let increments = rocking(&Vector3::new(0.0, 0.0, 0.1), 2.0);
+        for increment in &increments {
+            filter.predict(increment);
+        }
+        filter.state.velocity = Vector3::new(0.4, -0.3, 0.2);
+        let before = filter.clone();
+        filter.update_zero_velocity(0.01, false);
+        assert!(so3::turn(&before.state.attitude, &filter.state.attitude).abs() < 1e-4);
+        let up = before.state.up();
+        assert!((filter.gyro_bias - before.gyro_bias).dot(&up).abs() < 1e-7);
+        assert!(filter.state.velocity.norm() < 0.1);
+        // Its uncertainty is not lost either: nothing was learnt.
+        let heading = |filter: &PivotFilter| filter.change().covariance[(3, 3)];
+        assert!((heading(&filter) / heading(&before) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn in_an_elevator_the_vertical_velocity_is_free() {
+        let mut filter = started(&UP);
+        filter.state.velocity = Vector3::new(0.1, 0.1, 1.5);
+        filter.update_zero_velocity(0.01, true);
+        assert!((filter.state.velocity.z - 1.5).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_rest_shows_the_bias_and_the_vertical() {
+        let mut filter = started(&Vector3::new(0.0, 0.02, STANDARD_GRAVITY_M_S2));
+        let bias = Vector3::new(2e-4, -3e-4, 4e-4);
+        for _ in 0..200 {
+            let gyro = bias - filter.gyro_bias;
+            let accel = UP - filter.accel_bias;
+            filter.update_rest(&gyro, 4e-4, &accel);
+        }
+        assert!((filter.gyro_bias - bias).norm() < 2e-5);
+        // Tilt and horizontal accelerometer bias cannot be told apart at rest; together they explain what is seen.
+        let seen = filter.state.up() * STANDARD_GRAVITY_M_S2 + filter.accel_bias;
+        assert!((seen - UP).norm() < 2e-3);
+    }
+
+    /// A month of walking in ten minutes' worth of strides would take too long here; what must not grow shows in an hour.
+    #[test]
+    fn nothing_grows_over_thousands_of_steps() {
+        let stance = rocking(&Vector3::new(0.0, 0.0, 0.08), 0.4);
+        let mut filter = started(&UP);
+        let mut early = None;
+        for step in 0..3_000 {
+            for increment in &stance {
+                filter.predict(increment);
+                filter.update_zero_velocity(0.01, false);
+            }
+            filter.update_height(0.0, 1.0);
+            let change = filter.rebase();
+            assert!(square_root(&change.covariance).is_some());
+            if step == 100 {
+                early = Some(change.covariance);
+            }
+            if step == 2_999 {
+                let growth = change.covariance.trace() / early.unwrap().trace();
+                assert!((0.5..1.2).contains(&growth), "{growth}");
+            }
+        }
+        assert_eq!(filter.repaired(), 0);
+        assert!(filter.is_finite());
+    }
+
+    proptest! {
+        #[test]
+        fn the_covariance_stays_one_whatever_comes(
+            steps in proptest::collection::vec((0_usize..6, proptest::array::uniform6(-30.0_f32..30.0), 1e-3_f32..1.0), 1..60),
+        ) {
+            let mut filter = started(&UP);
+            for (what, v, sigma) in steps {
+                let accel = Vector3::new(v[0], v[1], v[2]);
+                let gyro = Vector3::new(v[3], v[4], v[5]) * 0.3;
+                match what {
+                    0 => filter.update_zero_velocity(sigma, v[0] > 0.0),
+                    1 => filter.update_height(v[0] * 0.01, sigma),
+                    2 => filter.update_rest(&gyro, sigma, &accel),
+                    3 => { filter.rebase(); }
+                    _ => {
+                        let mut integrator = Preintegrator::new(&preintegration::Parameters::default());
+                        for i in 0..4 {
+                            let sample = ImuSample::new(Micros(i * 5_000), (accel + UP).into(), gyro.into());
+                            if let Some(increment) = integrator.push(&sample, filter.gyro_bias(), filter.accel_bias()) {
+                                filter.predict(&increment);
+                            }
+                        }
+                    }
+                }
+                prop_assert!(filter.is_finite());
+                let m = filter.covariance;
+                prop_assert_eq!(m, m.transpose());
+                prop_assert!((0..FREEDOMS).all(|i| m[(i, i)] >= 0.0));
+            }
+            let change = filter.rebase();
+            prop_assert!((0..4).all(|i| change.covariance[(i, i)] >= 0.0));
+            prop_assert!(repair(&mut filter.covariance.clone()).iter().all(|value| value.is_finite()));
+        }
+    }
+}

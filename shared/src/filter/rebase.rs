@@ -36,7 +36,9 @@ pub fn change<const N: usize>(
     reading.fixed_view_mut::<3, 3>(0, POSITION).copy_from(&Matrix3::identity());
     reading.fixed_view_mut::<1, 3>(3, ROTATION).copy_from(&state.up().transpose());
     let mut read = reading * covariance * reading.transpose();
+    // What is known exactly may come out of the sum a rounding below zero.
     super::covariance::symmetrise(&mut read);
+    super::covariance::repaired_square_root(&mut read);
     Change { displacement: state.position, turn: so3::turn(reference, &state.attitude), covariance: read }
 }
 

@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn how_the_sensor_sits_on_the_shoe_does_not_matter() {
         let (steps, _) = run(&walk());
-        for mounting in [[core::f32::consts::PI, 0.0, 0.0], [0.0, 1.5708, 0.0], [0.0, -1.5708, 0.0], [2.0, -1.0, 0.7]] {
+        for mounting in [[core::f32::consts::PI, 0.0, 0.0], [0.0, 1.57, 0.0], [0.0, -1.57, 0.0], [2.0, -1.0, 0.7]] {
             let turned = so3::exp(&mounting.into());
             let samples: Vec<_> = walk()
                 .into_iter()
