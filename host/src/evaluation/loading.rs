@@ -57,13 +57,10 @@ pub fn read(manifest: &Manifest, entry: &Entry, recording: &Recording) -> Result
         truth.still = Some(still(&open(&source.path, &source.layout)?, source, recording)?);
     }
     if source.simulated {
-        let simulated = recording.truth.as_ref().ok_or(TruthError::NotSimulated)?;
-        truth.stances = Some(simulated.stances.iter().map(|stance| (stance.start, stance.end)).collect());
-        let points = simulated.poses.iter().map(|pose| (pose.time, [pose.position[0], pose.position[1]])).collect();
-        truth.track = Some(Reference { points, clock_search: None });
-        if let (Some(first), Some(last)) = (simulated.poses.first(), simulated.poses.last()) {
-            truth.height_change.get_or_insert(last.position[2] - first.position[2]);
-        }
+        let simulated = Truth::from(recording.truth.as_ref().ok_or(TruthError::NotSimulated)?);
+        truth.stances = simulated.stances;
+        truth.track = simulated.track;
+        truth.height_change = truth.height_change.or(simulated.height_change);
     }
     Ok(truth)
 }

@@ -3,6 +3,7 @@
 //! A truth is data in the project's units, in the clock of the recording; where it was read from is the business of
 //! [`loading`](super::loading).
 
+use crate::recording::SimulatedTruth;
 use sohle_shared::time::Micros;
 
 /// Everything known about one walk. What is not known is left out and not judged.
@@ -26,6 +27,20 @@ pub struct Truth {
     pub height_change: Option<f64>,
     /// Whether the height climbed is of interest although nobody has measured it.
     pub height_reported: bool,
+}
+
+impl From<&SimulatedTruth> for Truth {
+    /// All that a simulation knows: the way of the foot, its stances, the height it ends at.
+    fn from(simulated: &SimulatedTruth) -> Self {
+        let points = simulated.poses.iter().map(|pose| (pose.time, [pose.position[0], pose.position[1]])).collect();
+        let ends = simulated.poses.first().zip(simulated.poses.last());
+        Self {
+            track: Some(Reference { points, clock_search: None }),
+            stances: Some(simulated.stances.iter().map(|stance| (stance.start, stance.end)).collect()),
+            height_change: ends.map(|(first, last)| last.position[2] - first.position[2]),
+            ..Self::default()
+        }
+    }
 }
 
 /// A surveyed stance.
