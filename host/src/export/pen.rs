@@ -54,6 +54,19 @@ impl Pen {
         self.body.push('\n');
     }
 
+    /// What is drawn from here to [`Pen::unclip`] is shown inside a rectangle only; `name` is used once in a drawing.
+    pub fn clip(&mut self, name: &str, [x, y]: [f64; 2], [width, height]: [f64; 2]) {
+        self.put(format_args!(
+            "<clipPath id=\"{name}\"><rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>\
+             </clipPath>\n<g clip-path=\"url(#{name})\">"
+        ));
+    }
+
+    /// Ends what [`Pen::clip`] began.
+    pub fn unclip(&mut self) {
+        self.put(format_args!("</g>"));
+    }
+
     /// A filled rectangle from its upper left corner.
     pub fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], fill: &str) {
         self.put(format_args!(

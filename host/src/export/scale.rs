@@ -36,6 +36,19 @@ impl Range {
         Self { from: self.from - margin, to: self.to + margin }
     }
 
+    /// Made to reach to the ends of `other`, those that are not further away than `most`.
+    pub fn reaching(self, other: Self, most: f64) -> Self {
+        Self {
+            from: if self.from - other.from <= most { self.from.min(other.from) } else { self.from },
+            to: if other.to - self.to <= most { self.to.max(other.to) } else { self.to },
+        }
+    }
+
+    /// Whether `value` lies inside.
+    pub fn contains(&self, value: f64) -> bool {
+        (self.from..=self.to).contains(&value)
+    }
+
     /// The multiples of `spacing` inside.
     pub fn ticks(self, spacing: f64) -> impl Iterator<Item = f64> {
         let first = (self.from / spacing).ceil() as i64;
@@ -74,6 +87,14 @@ mod tests {
         let labels: Vec<_> = Range { from: -0.7, to: 0.6 }.ticks(0.5).map(|value| label(value, 0.5)).collect();
         assert_eq!(labels, ["-0.5", "0.0", "0.5"]);
         assert_eq!(label(-0.0, 5.0), "0");
+    }
+
+    #[test]
+    fn a_range_reaches_as_far_as_it_may() {
+        let range = Range { from: 0.0, to: 10.0 };
+        let reached = range.reaching(Range { from: -100.0, to: 12.0 }, 5.0);
+        assert_eq!(reached, Range { from: 0.0, to: 12.0 });
+        assert_eq!(range.reaching(Range { from: 3.0, to: 4.0 }, 5.0), range);
     }
 
     #[test]

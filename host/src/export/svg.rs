@@ -17,7 +17,7 @@ const ROW: f64 = 24.0;
 
 /// Between two arrows on a track, and the shortest stride that has room for one. **Units:** px.
 const ARROW_SPACING: f64 = 130.0;
-const SHORTEST_WITH_ARROW: f64 = 15.0;
+const SHORTEST_WITH_ARROW: f64 = 8.0;
 
 const PAPER: &str = "#ffffff";
 const FIELD: &str = "#fafaf8";
@@ -40,23 +40,28 @@ pub fn draw(picture: &Picture) -> String {
     lines.sort_by_key(|line| line.role);
     let shades = Shades::of(&lines);
 
-    let table = header(&mut pen, picture);
+    let table = header(&mut pen, picture, &lines);
     let plan = Plan::of(&lines, table + 16.0);
     plan.grid(&mut pen);
+    pen.clip("plan", [LEFT, plan.top], [RIGHT - LEFT, plan.bottom - plan.top]);
     for line in &lines {
         plan.line(&mut pen, line, &shades);
     }
     plan.marks(&mut pen, &lines);
-    let strip = Strip::of(&lines, plan.bottom + 62.0);
+    pen.unclip();
+    plan.beyond(&mut pen, &lines);
+    let strip = Strip::of(&lines, plan.bottom + 72.0);
     strip.grid(&mut pen, &lines, shades.0.is_some());
+    pen.clip("strip", [LEFT, strip.top], [RIGHT - LEFT, strip.bottom - strip.top]);
     for line in &lines {
         strip.line(&mut pen, line, &shades);
     }
+    pen.unclip();
     pen.finish(WIDTH, strip.bottom + 48.0, PAPER)
 }
 
 /// Title, figures, and the table that is the legend too. Returns where it ends.
-fn header(pen: &mut Pen, picture: &Picture) -> f64 {
+fn header(pen: &mut Pen, picture: &Picture, lines: &[&Line]) -> f64 {
     pen.text([LEFT, 42.0], &picture.title, TITLE);
     pen.text([LEFT, 66.0], &picture.note, NOTE);
     let columns = picture.columns.len() as f64;
@@ -67,7 +72,7 @@ fn header(pen: &mut Pen, picture: &Picture) -> f64 {
         pen.text([edge(column), y], heading, Lettering { anchor: Anchor::End, ..SMALL });
     }
     key(pen, picture, y);
-    for line in picture.lines.iter().rev() {
+    for line in lines.iter().rev() {
         y += ROW;
         let style = Style::of(line.role);
         pen.line([LEFT, y - 5.0], [LEFT + 34.0, y - 5.0], style.colour, style.width.max(2.0));
@@ -150,6 +155,21 @@ fn dot_mark(pen: &mut Pen, at: [f64; 2], mode: FloorMode, radius: f64, fill: &st
     }
 }
 
+/// A track may widen the picture by this share on each side. One that needs more has lost its way, and would crush the
+/// others if it were shown whole.
+const STRAY: f64 = 0.3;
+
+/// The range of `values` of what must be seen (the truth and the chosen track), and the rest where there is room.
+fn bounds(lines: &[&Line], values: impl Fn(&Line) -> Vec<f64>) -> Range {
+    let range = |wanted: &dyn Fn(Role) -> bool| {
+        Range::of(lines.iter().filter(|line| wanted(line.role)).flat_map(|line| values(line)))
+    };
+    match (range(&|role| role != Role::Documented), range(&|_| true)) {
+        (Some(must), Some(all)) => must.reaching(all, STRAY * must.length().max(1.0)),
+        (_, all) => all.unwrap_or(Range { from: 0.0, to: 0.0 }),
+    }
+}
+
 /// The walk from above.
 struct Plan {
     top: f64,
@@ -163,10 +183,8 @@ struct Plan {
 
 impl Plan {
     fn of(lines: &[&Line], top: f64) -> Self {
-        let points =
-            || lines.iter().flat_map(|line| line.dots.iter().map(|dot| dot.position).chain(line.foot.iter().copied()));
         let room = |axis: usize| {
-            let range = Range::of(points().map(|point| point[axis])).unwrap_or(Range { from: 0.0, to: 0.0 });
+            let range = bounds(lines, |line| line.dots.iter().map(|dot| dot.position[axis]).collect());
             range.padded(0.3 + 0.05 * range.length()).at_least(2.0)
         };
         let (x, y) = (room(0), room(1));
@@ -274,6 +292,20 @@ impl Plan {
         self.name(pen, end, "end", side);
     }
 
+    /// Says which tracks leave the picture, and how far from the start they get.
+    fn beyond(&self, pen: &mut Pen, lines: &[&Line]) {
+        let outside = |dot: &Dot| !(self.x.contains(dot.position[0]) && self.y.contains(dot.position[1]));
+        let mut y = self.bottom + 34.0;
+        for line in lines.iter().filter(|line| line.dots.iter().any(outside)) {
+            let from = line.dots[0].position;
+            let far = |dot: &Dot| (dot.position[0] - from[0]).hypot(dot.position[1] - from[1]);
+            let farthest = line.dots.iter().map(far).fold(0.0, f64::max);
+            let told = format!("'{}' leaves the picture, up to {farthest:.0} m from the start", line.label);
+            pen.text([LEFT, y], &told, Lettering { colour: Style::of(line.role).colour, ..SMALL });
+            y += 16.0;
+        }
+    }
+
     fn name(&self, pen: &mut Pen, [x, y]: [f64; 2], name: &str, side: f64) {
         let anchor = if side > 0.0 { Anchor::Start } else { Anchor::End };
         pen.text_with_halo([x + 12.0 * side, y - 8.0], name, Lettering { anchor, ..WORD });
@@ -290,8 +322,8 @@ struct Strip {
 
 impl Strip {
     fn of(lines: &[&Line], top: f64) -> Self {
-        let longest = lines.iter().flat_map(|line| distances(line)).fold(1.0, f64::max);
-        let height = Range::of(lines.iter().flat_map(|line| heights(line))).unwrap_or(Range { from: 0.0, to: 0.0 });
+        let longest = bounds(lines, |line| distances(line).collect()).to.max(1.0);
+        let height = bounds(lines, |line| heights(line).collect());
         Self {
             top,
             bottom: top + STRIP_HEIGHT,
@@ -431,6 +463,20 @@ mod tests {
             assert!(png::render(&draw(&picture(&track))).is_ok());
         }
         assert!(draw(&Picture::default()).contains("no steps were found"));
+    }
+
+    proptest::proptest! {
+        /// Law: whatever numbers a track holds, the picture is an SVG of ordinary size.
+        #[test]
+        fn any_numbers_are_drawn(places in proptest::collection::vec(proptest::array::uniform3(proptest::num::f64::ANY), 0..8)) {
+            let dots = places.into_iter().map(|position| Dot { position, mode: FloorMode::Level }).collect();
+            let mut picture = Picture::new("Any");
+            let (label, cells) = ("any".to_owned(), Vec::new());
+            picture.lines.push(Line { role: Role::Chosen, label, cells, dots, foot: Vec::new() });
+            let drawing = draw(&picture);
+            proptest::prop_assert!(drawing.len() < 100_000, "{} bytes", drawing.len());
+            proptest::prop_assert!(resvg::usvg::Tree::from_str(&drawing, &resvg::usvg::Options::default()).is_ok());
+        }
     }
 
     #[test]
