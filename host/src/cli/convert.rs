@@ -31,7 +31,7 @@ pub struct Args {
 }
 
 /// What `--profile` takes.
-fn long_help() -> String {
+pub(super) fn long_help() -> String {
     format!(
         "How to read it: the name of a layout ({}) or a TOML file that maps columns, for example\n\n  \
          time = \"t\"                     # column by name or number, or in place of it: rate_hz = 100.0\n  \

@@ -6,22 +6,31 @@
 //! was wrong).
 
 pub mod convert;
+pub mod demo;
 mod error;
 pub mod evaluate;
 pub mod parameters;
+pub mod replay;
+pub mod report;
 pub mod simulate;
+pub mod table;
 
 pub use error::Error;
 
+use crate::export::geojson::Origin;
 use clap::Parser;
 use clap::error::ErrorKind;
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Tracks a walk from one inertial sensor on the shoe
 #[derive(Debug, Parser)]
-#[command(name = "sohle", version, max_term_width = 100, disable_help_subcommand = true)]
+#[command(name = "sohle", version, override_usage = "sohle [COMMAND]", disable_help_subcommand = true)]
+#[command(after_help = "Without a command 'sohle' does what 'sohle demo' does.\n\n\
+Examples:\n  sohle\n  sohle replay walk.csv --compare\n  sohle parameters > mine.toml")]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -30,15 +39,43 @@ pub struct Cli {
 /// What the program can be asked for, in the order of the help.
 #[derive(Debug, clap::Subcommand)]
 enum Command {
+    Demo(demo::Args),
+    Replay(replay::Args),
     Convert(convert::Args),
     Evaluate(evaluate::Args),
     Parameters(parameters::Args),
     Simulate(simulate::Args),
 }
 
+/// Where the results of a walk go, and how much is said about them.
+#[derive(Debug, clap::Args)]
+pub struct Output {
+    /// Folder of the results; same names are replaced [default: sohle-out/ and the walk's name]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Where the walk began, and the bearing of its x axis [default bearing: 90, east]
+    ///
+    /// Degrees, WGS84; the bearing clockwise from north. Dead reckoning knows neither: without this the GeoJSON is in
+    /// metres and says so.
+    #[arg(long, value_name = "LAT,LON[,HEADING_DEG]", allow_hyphen_values = true)]
+    origin: Option<Origin>,
+    /// Says nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+impl Output {
+    /// The folder asked for, or that of the walk called `name`.
+    fn folder(&self, name: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("sohle-out").join(name))
+    }
+}
+
 /// Runs the command.
 fn dispatch(command: Command) -> Result<(), Error> {
     match command {
+        Command::Demo(args) => demo::run(args),
+        Command::Replay(args) => replay::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Parameters(args) => parameters::run(args),
@@ -48,6 +85,10 @@ fn dispatch(command: Command) -> Result<(), Error> {
 
 /// The whole program: reads `arguments` (the first is the program's name), does what they ask for, says what went wrong.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let mut arguments: Vec<_> = arguments.into_iter().collect();
+    if arguments.len() <= 1 {
+        arguments = vec!["sohle".into(), "demo".into()];
+    }
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
@@ -70,6 +111,16 @@ pub fn print(text: &str) -> Result<(), Error> {
         }
         _ => Ok(()),
     }
+}
+
+/// A bar on the standard error output; invisible when that is no terminal or when `quiet`.
+fn progress(length: u64, message: &str, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} % {eta}");
+    let bar = ProgressBar::new(length).with_message(message.to_owned());
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())).with_finish(ProgressFinish::AndClear)
 }
 
 /// Prints help and version as clap has them, and a wrong command line as one line.

@@ -1,0 +1,55 @@
+//! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
+
+use super::report::{Report, Settings};
+use super::{Error, Output, convert, parameters};
+use crate::recording::{self, Profile};
+use std::path::PathBuf;
+
+/// Tracks a recorded walk
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Writes track.svg, track.png, track.geojson, steps.csv, parameters.toml and recording.mcap. A recording\n\
+that holds its truth (of 'sohle demo' or 'sohle simulate') is judged by it.\n\n\
+Examples:\n  sohle replay walk.csv --compare\n  sohle replay sohle-out/demo/recording.mcap --out again\n  \
+sohle replay walk.mcap --parameters mine.toml --origin 48.2087,16.3726,35"
+)]
+pub struct Args {
+    /// The recording: MCAP of this program, or any layout that --profile can name
+    file: PathBuf,
+    /// How the file is laid out; recognised from the content when left out
+    #[arg(long, value_name = "NAME|FILE.toml", long_help = convert::long_help())]
+    profile: Option<String>,
+    /// Settings of the tracker as 'sohle parameters' prints them; others keep their default
+    #[arg(long, value_name = "FILE.toml")]
+    parameters: Option<PathBuf>,
+    /// Tracks with the settings of the source document too, side by side
+    #[arg(long)]
+    compare: bool,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Reads, tracks, tells and writes.
+pub fn run(args: Args) -> Result<(), Error> {
+    let Args { file, profile, parameters, compare, output } = args;
+    let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut settings = vec![match &parameters {
+        Some(path) => Settings { label: stem(path), parameters: parameters::read(path)?, ..Settings::default() },
+        None => Settings::default(),
+    }];
+    if compare {
+        settings.push(Settings::documented());
+    }
+    let profile = profile.map(|text| Profile::parse(&text)).transpose()?;
+    let recording = recording::open(&file, profile.as_ref())?;
+    let folder = output.folder(&stem(&file));
+    Report {
+        title: recording.name.clone(),
+        recording,
+        settings,
+        folder: &folder,
+        origin: output.origin,
+        quiet: output.quiet,
+    }
+    .run()
+}

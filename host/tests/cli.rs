@@ -1,0 +1,171 @@
+//! The program from outside: exit codes, the lines it says, the files it leaves.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot run its program has failed")]
+
+use geojson::GeoJson;
+use resvg::usvg;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Runs the program in `folder`.
+fn sohle(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sohle")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn stdout(output: &Output) -> &str {
+    std::str::from_utf8(&output.stdout).unwrap()
+}
+
+/// The one line an unsuccessful run ends with.
+#[track_caller]
+fn refusal(folder: &Path, arguments: &[&str], code: i32) -> String {
+    let output = sohle(folder, arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(told.starts_with("error: "), "{told}");
+    assert!(output.stdout.is_empty());
+    told
+}
+
+/// Names of what lies in a folder, sorted.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn version_and_help_go_to_the_standard_output() {
+    let home = tempfile::tempdir().unwrap();
+    let version = sohle(home.path(), &["--version"]);
+    assert!(version.status.success());
+    assert_eq!(stdout(&version), format!("sohle {}\n", env!("CARGO_PKG_VERSION")));
+    let help = sohle(home.path(), &["--help"]);
+    assert!(help.status.success());
+    for command in ["demo", "replay", "parameters"] {
+        assert!(stdout(&help).contains(command), "{command}");
+        let help = sohle(home.path(), &[command, "--help"]);
+        assert!(help.status.success() && stdout(&help).contains("Example"), "{command}");
+    }
+}
+
+#[test]
+fn a_wrong_command_line_is_one_line_and_code_2() {
+    let home = tempfile::tempdir().unwrap();
+    assert!(refusal(home.path(), &["replay"], 2).contains("<FILE>"));
+    assert!(refusal(home.path(), &["replay", "a.csv", "--owt", "b"], 2).contains("--owt"));
+    assert!(refusal(home.path(), &["wander"], 2).contains("wander"));
+    assert!(refusal(home.path(), &["demo", "--seed", "many"], 2).contains("many"));
+    assert!(refusal(home.path(), &["replay", "a.csv", "--origin", "91,0"], 2).contains("LAT,LON"));
+    assert!(names(home.path()).is_empty());
+}
+
+#[test]
+fn what_cannot_be_replayed_is_one_line_and_leaves_nothing() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::create_dir(home.path().join("folder")).unwrap();
+    std::fs::write(home.path().join("empty.csv"), "").unwrap();
+    std::fs::write(home.path().join("noise.bin"), [0_u8, 159, 146, 150, 255]).unwrap();
+    std::fs::write(home.path().join("bad.toml"), "\nshoe_size = 43\n").unwrap();
+    let before = names(home.path());
+    assert!(refusal(home.path(), &["replay", "absent.csv"], 1).contains("absent.csv"));
+    assert!(refusal(home.path(), &["replay", "folder"], 1).contains("folder"));
+    assert!(refusal(home.path(), &["replay", "empty.csv"], 1).contains("empty.csv"));
+    assert!(refusal(home.path(), &["replay", "noise.bin"], 1).contains("noise.bin"));
+    let told = refusal(home.path(), &["replay", "empty.csv", "--parameters", "bad.toml"], 1);
+    assert!(told.contains("bad.toml, line 2") && told.contains("shoe_size"), "{told}");
+    assert!(refusal(home.path(), &["replay", "empty.csv", "--parameters", "absent.toml"], 1).contains("absent.toml"));
+    assert!(refusal(home.path(), &["replay", "empty.csv", "--profile", "nobody's"], 1).contains("nobody's"));
+    assert_eq!(names(home.path()), before);
+}
+
+/// What every tracked walk leaves.
+const FILES: [&str; 6] = ["parameters.toml", "recording.mcap", "steps.csv", "track.geojson", "track.png", "track.svg"];
+/// What a comparison adds.
+const DOCUMENTED: [&str; 2] = ["parameters_documented.toml", "steps_documented.csv"];
+
+fn sorted(names: impl IntoIterator<Item = &'static str>) -> Vec<String> {
+    let mut names: Vec<_> = names.into_iter().map(String::from).collect();
+    names.sort();
+    names
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+#[test]
+fn the_demo_needs_no_arguments_and_its_outputs_can_be_read() {
+    let home = tempfile::tempdir().unwrap();
+    let output = sohle(home.path(), &[]);
+    assert!(output.status.success());
+    assert!(output.stderr.is_empty(), "no progress bar where there is no terminal");
+    let told = stdout(&output);
+    for word in ["default", "documented", "truth", "missed", "end error", "height error", "time taken"] {
+        assert!(told.contains(word), "{word}: {told}");
+    }
+    assert!(told.contains("sohle-out/demo"));
+    let folder = home.path().join("sohle-out/demo");
+    assert_eq!(names(&folder), sorted(FILES.into_iter().chain(DOCUMENTED)));
+
+    assert!(usvg::Tree::from_str(&read(&folder, "track.svg"), &usvg::Options::default()).is_ok());
+    assert!(std::fs::read(folder.join("track.png")).unwrap().starts_with(b"\x89PNG"));
+    let features = match read(&folder, "track.geojson").parse().unwrap() {
+        GeoJson::FeatureCollection(collection) => collection.features,
+        other => panic!("{other}"),
+    };
+    let rows = |name: &str| csv::Reader::from_reader(read(&folder, name).as_bytes()).records().count();
+    let (chosen, documented) = (rows("steps.csv"), rows("steps_documented.csv"));
+    // 160 strides; how many are found exactly is what the evaluation tells.
+    assert!(chosen > 144, "{chosen} steps");
+    // A line of one point is none.
+    let lines = 1 + [chosen, documented].into_iter().filter(|&steps| steps > 1).count();
+    assert_eq!(features.len(), lines + chosen + documented, "a line for each track and a point for each stance");
+}
+
+#[test]
+fn the_same_demo_writes_the_same_bytes_and_its_recording_gives_the_same_track() {
+    let home = tempfile::tempdir().unwrap();
+    for out in ["a", "b"] {
+        let output = sohle(home.path(), &["demo", "--headless", "--quiet", "--seed", "3", "--out", out]);
+        assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
+    }
+    let (a, b, c) = (home.path().join("a"), home.path().join("b"), home.path().join("c"));
+    for name in names(&a) {
+        assert!(std::fs::read(a.join(&name)).unwrap() == std::fs::read(b.join(&name)).unwrap(), "{name}");
+    }
+    let replayed = sohle(home.path(), &["replay", "a/recording.mcap", "--out", "c"]);
+    assert!(replayed.status.success());
+    assert!(stdout(&replayed).contains("truth"));
+    for name in ["steps.csv", "recording.mcap"] {
+        assert!(std::fs::read(a.join(name)).unwrap() == std::fs::read(c.join(name)).unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn a_recording_is_replayed_with_settings_of_ones_own() {
+    let Some(recordings) = sohle::recording::recordings_dir() else { return };
+    let home = tempfile::tempdir().unwrap();
+    let printed = sohle(home.path(), &["parameters"]);
+    std::fs::write(home.path().join("mine.toml"), &printed.stdout).unwrap();
+    let walk = recordings.join("foot_xio/short_walk.csv");
+    let replay = ["replay", walk.to_str().unwrap(), "--parameters", "mine.toml", "--origin", "51.45,-2.6,0"];
+    let output = sohle(home.path(), &replay);
+    assert!(output.status.success(), "{output:?}");
+    assert!(stdout(&output).contains("mine"));
+    let folder = home.path().join("sohle-out/short_walk");
+    assert_eq!(names(&folder), sorted(FILES));
+    assert_eq!(read(&folder, "parameters.toml").as_bytes(), printed.stdout);
+    assert!(read(&folder, "track.geojson").contains("\"crs_note\":\"WGS84"));
+}
+
+#[test]
+fn outputs_that_cannot_be_written_are_told() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("taken"), "mine").unwrap();
+    assert!(refusal(home.path(), &["demo", "--out", "taken/demo"], 1).contains("taken/demo"));
+    assert!(refusal(home.path(), &["demo", "--out", "taken"], 1).contains("taken"));
+    assert_eq!(read(home.path(), "taken"), "mine");
+}
