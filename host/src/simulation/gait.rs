@@ -80,14 +80,14 @@ pub const WALK: Shape = Shape {
     toe_off: 0.43,
     contact: 0.735,
     impact: 75.0,
-    rocking: 0.20,
+    rocking: 0.17,
     sideways: 0.02,
     roll: [5.0, -6.0],
 };
 
 /// Walking fast: the same shape, larger and quicker. Source: recording `openshoe250` at 7 km/h.
 pub const FAST: Shape =
-    Shape { length: 1.22, time: 0.81, impact: 80.0, rocking: 0.35, stance_until: 0.16, stance_from: 0.86, ..WALK };
+    Shape { length: 1.22, time: 0.81, impact: 80.0, rocking: 0.24, stance_until: 0.16, stance_from: 0.86, ..WALK };
 
 /// Running. Source: recording of the surveyed run 34, median of 22 strides.
 pub const RUN: Shape = Shape {
@@ -124,7 +124,7 @@ pub const UP: Shape = Shape {
     toe_off: 0.52,
     contact: 0.78,
     impact: 40.0,
-    rocking: 0.09,
+    rocking: 0.08,
     sideways: 0.02,
     roll: [4.0, -3.0],
 };
@@ -144,7 +144,7 @@ pub const DOWN: Shape = Shape {
     toe_off: 0.40,
     contact: 0.755,
     impact: 50.0,
-    rocking: 0.11,
+    rocking: 0.09,
     sideways: 0.02,
     roll: [4.0, -4.0],
 };
@@ -164,7 +164,7 @@ pub const SIDE: Shape = Shape {
     toe_off: 0.35,
     contact: 0.68,
     impact: 16.0,
-    rocking: 0.09,
+    rocking: 0.07,
     sideways: 0.0,
     roll: [4.0, -4.0],
 };
@@ -196,9 +196,9 @@ const WALK_LIFT: Controls = [
     0.0, 0.0, 0.0,
 ];
 const RUN_PITCH: Controls = [
-    0.0, 0.0, 0.0, -1.5, -4.0, -8.0, -13.5, -20.5, -28.0, -36.0, -44.0, -51.0, -57.0, -62.0, -67.0, -70.0, -72.0,
-    -73.0, -70.0, -65.0, -58.5, -51.0, -42.0, -32.0, -21.5, -10.5, 1.5, 13.0, 22.0, 27.0, 30.0, 32.5, 30.0, 21.5, 11.0,
-    4.5, 1.8, 0.6, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, -0.8, -2.0, -4.5, -9.0, -15.5, -23.0, -31.0, -39.5, -48.0, -55.5, -62.0, -67.0, -70.0, -72.0, -73.0,
+    -70.0, -65.0, -58.5, -51.0, -42.0, -32.0, -21.5, -10.5, 1.5, 13.0, 22.0, 27.0, 30.0, 32.5, 30.0, 19.5, 9.0, 3.2,
+    1.2, 0.4, 0.0, 0.0, 0.0,
 ];
 const RUN_ADVANCE: Controls = [
     0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.004, 0.014, 0.034, 0.064, 0.098, 0.137, 0.185, 0.243,

@@ -51,7 +51,7 @@ const WIGGLE_DEG: f64 = 9.0;
 /// Frequencies of the rocking about pitch and about roll, and their share of its variance; the first of both together
 /// make the foot roll around evenly. **Units:** Hz.
 const ROCKING: [[(f64, f64); 3]; 2] =
-    [[(3.7, 0.80), (6.7, 0.15), (13.0, 0.05)], [(3.7, 0.80), (7.7, 0.15), (17.0, 0.05)]];
+    [[(1.9, 0.85), (5.3, 0.12), (13.0, 0.03)], [(1.9, 0.85), (6.1, 0.12), (17.0, 0.03)]];
 
 /// A stance whose end may not be known yet. **Units:** s.
 #[derive(Clone, Copy, Debug)]
