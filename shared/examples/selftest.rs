@@ -7,7 +7,10 @@ use sohle_shared::tracker::{Parameters, Tracker};
 
 fn main() {
     println!("rotations {:016x}", selftest::rotations().0);
-    for (name, parameters) in [("default", Parameters::default()), ("documented", Parameters::documented())] {
-        println!("{name} {}", selftest::track(selftest::PERIOD_US, &parameters, Tracker::push));
+    for period_us in selftest::PERIODS_US {
+        for (name, parameters) in [("default", Parameters::default()), ("documented", Parameters::documented())] {
+            let report = selftest::track(period_us, &parameters, Tracker::push);
+            println!("{name} {} Hz {report}", 1_000_000 / period_us);
+        }
     }
 }

@@ -50,8 +50,8 @@ const LAST_STANCE_US: i64 = 1_500_000;
 /// How high the foot is lifted above the straight way of a swing. **Units:** m.
 const LIFT: f32 = 0.12;
 
-/// The sampling at which fingerprints are compared: 200 Hz. **Units:** microseconds.
-pub const PERIOD_US: u32 = 5_000;
+/// The samplings at which fingerprints are compared: 200 Hz and 2 kHz. **Units:** microseconds.
+pub const PERIODS_US: [u32; 2] = [5_000, 500];
 
 /// How the sensor sits on the shoe: no axis is along anything. Rotation vector. **Units:** rad.
 const MOUNTING: [f32; 3] = [0.9, -0.4, 0.3];

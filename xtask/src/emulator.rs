@@ -1,6 +1,6 @@
 //! The tracker on an emulated Cortex-M4F: its bits must be the host's, and its cost is told.
 
-use crate::cost::{self, Cost, Phases};
+use crate::cost::{self, Cost};
 use crate::process::{self, Failure, Said};
 use crate::{device, in_root, tools};
 use std::time::Duration;
@@ -21,29 +21,34 @@ pub fn run() -> Result<(), Failure> {
     let pairs = compare(&lines(&native, ""), &lines(&emulated, "bits "))?;
     println!("{pairs} fingerprints of host and Cortex-M4F are equal:");
     print!("{native}");
-    println!("\ninstructions for each IMU sample at 200 Hz (Cortex-M4F)");
-    println!("{}", cost::table(phases(&emulated, "default")?, phases(&emulated, "documented")?));
-    println!("most instructions for a sample, and depth of the stack in bytes with the tracker on it");
-    for line in lines(&emulated, "most ").iter().chain(&lines(&emulated, "stack ")) {
-        println!("{line}");
+    for rate in ["200", "2000"] {
+        let both = |phase| {
+            Ok::<_, Failure>((
+                phase,
+                cost(&emulated, "default", rate, phase)?,
+                cost(&emulated, "documented", rate, phase)?,
+            ))
+        };
+        let (swinging, standing) = (both("swinging")?, both("standing")?);
+        let mean = ("mean", swinging.1.and(standing.1), swinging.2.and(standing.2));
+        let title = format!("\ninstructions for each IMU sample at {rate} Hz (Cortex-M4F)");
+        print!("{}", cost::table(&title, &[swinging, standing, mean]));
+    }
+    println!("\nthe tracker on the Cortex-M4F");
+    for line in lines(&emulated, "told ") {
+        println!("  {line}");
     }
     Ok(())
 }
 
-/// What the emulator counted: lines of setting, phase, samples, instructions.
-fn phases(emulated: &str, setting: &str) -> Result<Phases, Failure> {
-    let phase = |name: &str| {
-        let start = format!("cost {setting} {name} ");
-        let numbers: Vec<u64> =
-            lines(emulated, &start).first()?.split(' ').map_while(|word| word.parse().ok()).collect();
-        match numbers[..] {
-            [samples, instructions] => Some(Cost { samples, instructions }),
-            _ => None,
-        }
-    };
-    match (phase("swinging"), phase("standing")) {
-        (Some(swinging), Some(standing)) => Ok(Phases { swinging, standing }),
-        _ => Err(Failure::Found(format!("the emulator told no cost of the {setting} setting"))),
+/// What the emulator counted: lines of setting, rate, phase, samples, instructions.
+fn cost(emulated: &str, setting: &str, rate: &str, phase: &str) -> Result<Cost, Failure> {
+    let start = format!("cost {setting} {rate} {phase} ");
+    let numbers: Vec<u64> =
+        lines(emulated, &start).iter().flat_map(|line| line.split(' ')).map_while(|word| word.parse().ok()).collect();
+    match numbers[..] {
+        [count, instructions] => Ok(Cost { count, instructions }),
+        _ => Err(Failure::Found(format!("the emulator told no cost of {setting}, {phase}, at {rate} Hz"))),
     }
 }
 
@@ -89,9 +94,8 @@ mod tests {
 
     #[test]
     fn the_cost_is_read_from_what_the_emulator_says() {
-        let text = "bits default 1\ncost default swinging 2 90\ncost default standing 1 70\n";
-        let cost = |samples, instructions| Cost { samples, instructions };
-        assert_eq!(phases(text, "default").ok(), Some(Phases { swinging: cost(2, 90), standing: cost(1, 70) }));
-        assert!(phases(text, "documented").is_err());
+        let text = "bits default 1\ncost default 200 swinging 2 90\ncost default 200 standing 1 70\n";
+        assert_eq!(cost(text, "default", "200", "swinging").ok(), Some(Cost { count: 2, instructions: 90 }));
+        assert!(cost(text, "default", "2000", "swinging").is_err());
     }
 }

@@ -37,27 +37,28 @@ impl Cost {
         self.most = self.most.max(u64::from(ticks));
     }
 
-    fn print(&self, name: &str, phase: &str) {
-        hprintln!("cost {} {} {} {}", name, phase, self.samples, self.ticks * PER_TICK);
-        hprintln!("most {} {} {}", name, phase, self.most * PER_TICK);
+    fn print(&self, name: &str, rate: u32, phase: &str) {
+        hprintln!("cost {} {} {} {} {}", name, rate, phase, self.samples, self.ticks * PER_TICK);
     }
 }
 
-fn measure(name: &str, parameters: &Parameters) {
+fn measure(name: &str, period_us: u32, parameters: &Parameters) {
+    let rate = 1_000_000 / period_us;
     let (mut swinging, mut standing) = (Cost::default(), Cost::default());
     stack::paint();
-    let report = selftest::track(selftest::PERIOD_US, parameters, |tracker, sample| {
+    let report = selftest::track(period_us, parameters, |tracker, sample| {
         let before = SYST::get_current();
         let output = tracker.push(sample);
         let ticks = before.wrapping_sub(SYST::get_current()) & RELOAD;
         if output.stance { &mut standing } else { &mut swinging }.add(ticks);
         output
     });
-    let bytes = stack::used();
-    hprintln!("bits {} {}", name, report);
-    swinging.print(name, "swinging");
-    standing.print(name, "standing");
-    hprintln!("stack {} {}", name, bytes);
+    let stack = stack::used();
+    let most = swinging.most.max(standing.most) * PER_TICK;
+    hprintln!("bits {} {} Hz {}", name, rate, report);
+    swinging.print(name, rate, "swinging");
+    standing.print(name, rate, "standing");
+    hprintln!("told {} {} Hz: at most {} instructions for a sample, {} bytes of stack", name, rate, most, stack);
 }
 
 #[cortex_m_rt::entry]
@@ -69,8 +70,10 @@ fn main() -> ! {
         peripherals.SYST.enable_counter();
     }
     hprintln!("bits rotations {:016x}", selftest::rotations().0);
-    measure("default", &Parameters::default());
-    measure("documented", &Parameters::documented());
+    for period_us in selftest::PERIODS_US {
+        measure("default", period_us, &Parameters::default());
+        measure("documented", period_us, &Parameters::documented());
+    }
     debug::exit(debug::EXIT_SUCCESS);
     loop {}
 }
