@@ -35,6 +35,8 @@ use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 /// Degrees of freedom of the error: rotation, position, velocity, gyroscope bias, accelerometer bias, lever arm.
 pub const FREEDOMS: usize = 18;
+/// Rotation, position and velocity: the part of the error that a prediction turns and mixes.
+const POSE: usize = 9;
 /// First component of the gyroscope bias. **Units:** rad/s; **Frame:** sensor.
 const GYRO_BIAS: usize = 9;
 /// First component of the accelerometer bias. **Units:** m/s²; **Frame:** sensor.
@@ -201,8 +203,9 @@ impl PivotFilter {
             return;
         }
         let attitude = self.state.attitude;
-        let (velocity_turn, velocity) = self.turned(&increment.velocity);
-        let (position_turn, position) = self.turned(&increment.position);
+        let spread = self.spread();
+        let (velocity_turn, velocity) = self.turned(&increment.velocity, &spread);
+        let (position_turn, position) = self.turned(&increment.position, &spread);
         let gravity = Vector3::new(0.0, 0.0, -STANDARD_GRAVITY_M_S2);
         self.state.position += self.state.velocity * dt + position + gravity * (0.5 * dt * dt);
         self.state.velocity += velocity + gravity * dt;
@@ -241,21 +244,27 @@ impl PivotFilter {
         }
     }
 
-    /// `vector`, turned into the world by sigma points of the attitude: how it depends on the rotation error, and its mean.
-    fn turned(&self, vector: &Vector3<f32>) -> (Matrix3<f32>, Vector3<f32>) {
-        let mut derivative = Matrix3::zeros();
-        let mut mean = *vector;
-        for axis in 0..3 {
+    /// The sigma points of the attitude: one ahead and one behind along each axis `e`, by the angle `sigma`. Turned by
+    /// them, a vector `v` becomes `v cos sigma +- e x v sin sigma` (across the axis). Half the difference over `sigma` is
+    /// `e x v` times the first number; the mean over the seven points (Foot, 4.45) falls short of `v`, across the axis, by
+    /// the second.
+    fn spread(&self) -> [(f32, f32); 3] {
+        [0, 1, 2].map(|axis| {
             let variance = self.covariance[(ROTATION + axis, ROTATION + axis)];
             let sigma = libm::sqrtf(variance.clamp(LEAST_SPREAD * LEAST_SPREAD, 1.0));
-            let mut offset = Vector3::zeros();
-            offset[axis] = sigma;
-            let out = so3::exp(&offset);
-            let (ahead, behind) = (out * vector, out.inverse() * vector);
-            derivative.set_column(axis, &((ahead - behind) / (2.0 * sigma)));
-            // Mean over the seven points, Foot 4.45.
-            mean += ((ahead - vector) + (behind - vector)) / 7.0;
-        }
+            let point = so3::exp(&Vector3::new(sigma, 0.0, 0.0));
+            // Sine and 1 - cosine of the whole angle from those of the half.
+            (2.0 * point.w * point.i / sigma, 2.0 * (2.0 * point.i * point.i) / 7.0)
+        })
+    }
+
+    /// `vector`, turned into the world by sigma points of the attitude: how it depends on the rotation error, and its mean.
+    fn turned(&self, vector: &Vector3<f32>, spread: &[(f32, f32); 3]) -> (Matrix3<f32>, Vector3<f32>) {
+        let [(slope_x, fall_x), (slope_y, fall_y), (slope_z, fall_z)] = *spread;
+        let [x, y, z] = [vector.x, vector.y, vector.z];
+        let across = [Vector3::new(0.0, -z, y), Vector3::new(z, 0.0, -x), Vector3::new(-y, x, 0.0)];
+        let derivative = Matrix3::from_columns(&[across[0] * slope_x, across[1] * slope_y, across[2] * slope_z]);
+        let mean = Vector3::new(x - x * (fall_y + fall_z), y - y * (fall_x + fall_z), z - z * (fall_x + fall_y));
         let rotation = self.state.attitude.to_rotation_matrix();
         (rotation.matrix() * derivative, rotation * mean)
     }
@@ -282,16 +291,27 @@ impl PivotFilter {
         let row = back * rotation - p.fixed_rows::<3>(GYRO_BIAS) * dt;
         p.fixed_rows_mut::<3>(ROTATION).copy_from(&row);
 
-        let rotation = p.fixed_columns::<3>(ROTATION).into_owned();
-        let velocity = p.fixed_columns::<3>(VELOCITY).into_owned();
-        let column = p.fixed_columns::<3>(POSITION) + rotation * position_turn.transpose() + velocity * dt;
-        p.fixed_columns_mut::<3>(POSITION).copy_from(&column);
-        let column = velocity
-            + rotation * velocity_turn.transpose()
-            + p.fixed_columns::<3>(ACCEL_BIAS) * velocity_bias.transpose();
-        p.fixed_columns_mut::<3>(VELOCITY).copy_from(&column);
-        let column = rotation * back.transpose() - p.fixed_columns::<3>(GYRO_BIAS) * dt;
-        p.fixed_columns_mut::<3>(ROTATION).copy_from(&column);
+        // Of the columns, only those of the pose itself are new; where the rows of the others meet them, the upper
+        // triangle has them already.
+        let rotation = p.fixed_view::<POSE, 3>(0, ROTATION).into_owned();
+        let velocity = p.fixed_view::<POSE, 3>(0, VELOCITY).into_owned();
+        let position = p.fixed_view::<POSE, 3>(0, POSITION) + rotation * position_turn.transpose() + velocity * dt;
+        p.fixed_view_mut::<POSE, 3>(0, POSITION).copy_from(&position);
+        let accel_bias = p.fixed_view::<POSE, 3>(0, ACCEL_BIAS) * velocity_bias.transpose();
+        p.fixed_view_mut::<POSE, 3>(0, VELOCITY)
+            .copy_from(&(velocity + rotation * velocity_turn.transpose() + accel_bias));
+        let turned = rotation * back.transpose() - p.fixed_view::<POSE, 3>(0, GYRO_BIAS) * dt;
+        p.fixed_view_mut::<POSE, 3>(0, ROTATION).copy_from(&turned);
+        for i in 0..POSE {
+            for j in 0..i {
+                let mean = 0.5 * (p[(i, j)] + p[(j, i)]);
+                p[(i, j)] = mean;
+                p[(j, i)] = mean;
+            }
+            for j in POSE..FREEDOMS {
+                p[(j, i)] = p[(i, j)];
+            }
+        }
     }
 
     fn add_noise(&mut self, dt: f32, rotation: f32, velocity: f32) {
@@ -309,7 +329,6 @@ impl PivotFilter {
                 self.covariance[(axis, axis)] += variance;
             }
         }
-        symmetrise(&mut self.covariance);
     }
 
     /// The pivot does not move (H2): the velocity of the sensor is what its turning about the pivot makes it. `sigma` is how
@@ -610,8 +629,8 @@ mod tests {
         let before = Covariance::from_fn(|i, j| if i == j { 1.0 } else { 0.01 * ((i + j) % 7) as f32 });
         filter.covariance = before;
         let predicted = {
-            let (velocity_turn, _) = filter.turned(&increment.velocity);
-            let (position_turn, _) = filter.turned(&increment.position);
+            let (velocity_turn, _) = filter.turned(&increment.velocity, &filter.spread());
+            let (position_turn, _) = filter.turned(&increment.position, &filter.spread());
             let rotation = filter.state.attitude.to_rotation_matrix();
             let back = increment.turn.inverse().to_rotation_matrix();
             filter.propagate(back.matrix(), &velocity_turn, &position_turn, &(rotation.matrix() * -dt), dt);
