@@ -42,10 +42,10 @@ pub fn run() -> Result<(), Failure> {
 }
 
 fn build() -> Result<PathBuf, Failure> {
-    let mut command = process::cargo();
-    let words =
-        "build --release --locked --package sohle-shared --example cost --message-format json-render-diagnostics";
-    let said = process::read(command.args(words.split(' ')))?;
+    let words = ["build", "--release", "--locked", "--package", "sohle-shared", "--example", "cost"];
+    process::run(process::cargo().args(words))?;
+    // Built now: the second call only says where it is, wherever the target folder of this machine may be.
+    let said = process::read(process::cargo().args(words).args(["--message-format", "json"]))?;
     let messages = said.out.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
     let built = messages.filter_map(|message| message.get("executable")?.as_str().map(PathBuf::from)).next_back();
     built.ok_or_else(|| Failure::Found("cargo built no example `cost`".into()))

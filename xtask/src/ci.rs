@@ -2,7 +2,7 @@
 
 use crate::process::{self, Failure};
 use crate::stage::{Run, Tally};
-use crate::{check, device, emulator, tools};
+use crate::{bench, check, determinism, device, emulator, tools};
 use std::process::Command;
 
 /// How to run the checks.
@@ -29,6 +29,8 @@ pub fn run(arguments: &Arguments) -> bool {
     run.stage("documentation tests", || counted(cargo("test --locked --workspace --doc")));
     run.check("no_std build", device::build_shared);
     run.check("bits on a Cortex-M4F", emulator::run);
+    run.check("cost", bench::run);
+    run.check("determinism", determinism::run);
     run.summary()
 }
 

@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod ci;
 mod cost;
+mod determinism;
 mod device;
 mod emulator;
 mod process;
@@ -33,6 +34,8 @@ enum Command {
     Emulator,
     /// Counts the instructions of the documented and the default filter under callgrind.
     Bench,
+    /// Evaluates in debug and release builds, on one and two threads: the outputs must be the same.
+    Determinism,
     /// Fetches the recordings of the manifest from their upstream repositories.
     Recordings(recordings::Arguments),
     /// Checks what is committed: no data, licences of the dependencies, the changelog.
@@ -57,6 +60,7 @@ fn main() -> ExitCode {
         Command::Device => device::build_shared(),
         Command::Emulator => emulator::run(),
         Command::Bench => bench::run(),
+        Command::Determinism => determinism::run(),
         Command::Recordings(arguments) => recordings::run(&arguments),
         Command::Check => check::run(),
         Command::Install => tools::install(&tools::ALL),

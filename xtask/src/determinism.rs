@@ -1,0 +1,76 @@
+//! The same input must give the same output: in debug and release builds, on one thread and on two.
+
+use crate::process::{self, Failure};
+use std::process::Command;
+
+/// The scores of the manifest, as far as they matter here.
+#[derive(serde::Deserialize)]
+struct Scores {
+    recordings: Vec<Recording>,
+    outputs_hash: String,
+}
+
+#[derive(serde::Deserialize)]
+struct Recording {
+    status: String,
+}
+
+/// Runs the evaluation in all ways and compares the hash over everything it put out.
+pub fn run() -> Result<(), Failure> {
+    let mut seen: Vec<(String, String)> = Vec::new();
+    for profile in ["dev", "release"] {
+        process::run(&mut cargo("build", profile))?;
+        for threads in ["1", "2"] {
+            let mut command = cargo("run", profile);
+            command.args(["--quiet", "--", "evaluate", "--format", "json", "--threads", threads]);
+            let scores = read(&process::read(&mut command)?.out)?;
+            let way = format!("{profile} build, {threads} threads");
+            let scored = scores.recordings.iter().filter(|recording| recording.status == "scored").count();
+            println!("{} {way}: {scored} of {} results scored", scores.outputs_hash, scores.recordings.len());
+            seen.push((way, scores.outputs_hash));
+        }
+    }
+    compare(&seen)
+}
+
+fn cargo(verb: &str, profile: &str) -> Command {
+    let mut command = process::cargo();
+    command.args([verb, "--locked", "--package", "sohle", "--bin", "sohle", "--profile", profile]);
+    command
+}
+
+fn read(text: &str) -> Result<Scores, Failure> {
+    serde_json::from_str(text).map_err(|error| Failure::Found(format!("sohle evaluate --format json: {error}")))
+}
+
+fn compare(seen: &[(String, String)]) -> Result<(), Failure> {
+    for ((first, one), (second, other)) in seen.iter().zip(seen.iter().skip(1)) {
+        if one != other {
+            return Err(Failure::Found(format!("the outputs differ: {first} gives {one}, {second} gives {other}")));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_different_hash_is_told_with_both_ways() {
+        let seen = |hashes: [&str; 3]| {
+            let ways = ["dev build, 1 threads", "dev build, 2 threads", "release build, 1 threads"];
+            ways.iter().zip(hashes).map(|(way, hash)| ((*way).to_owned(), hash.to_owned())).collect::<Vec<_>>()
+        };
+        assert!(compare(&seen(["a", "a", "a"])).is_ok());
+        let told = compare(&seen(["a", "a", "b"])).err().map(|failure| failure.to_string()).unwrap_or_default();
+        assert_eq!(told, "the outputs differ: dev build, 2 threads gives a, release build, 1 threads gives b");
+    }
+
+    #[test]
+    fn only_what_is_needed_is_read() {
+        let text = r#"{"recordings": [{"name": "a", "status": "scored", "steps": 4}], "outputs_hash": "ab"}"#;
+        assert_eq!(read(text).unwrap().outputs_hash, "ab");
+        assert!(read("{}").is_err());
+    }
+}
