@@ -26,7 +26,7 @@ pub enum Metric {
     HeightPer50m,
     /// Difference of the heights climbed by the two feet of one walk.
     FeetHeightDifference,
-    /// Slope of the heading error over time, left positive.
+    /// Typical slope of the heading error over time, left positive.
     HeadingDrift,
     /// Surveyed or simulated stances.
     StancesTrue,
@@ -44,6 +44,8 @@ pub enum Metric {
     StrideCountError,
     /// Root mean square error of the lengths of single strides.
     StrideLengthRms,
+    /// The same over the strides on which the foot hardly turned.
+    StrideLengthStraightRms,
     /// Their mean error; positive: too long.
     StrideLengthMeanError,
     /// Strides of known length.
@@ -71,7 +73,7 @@ pub enum Kind {
 
 impl Metric {
     /// All of them, in the order of output.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::RigidRmse,
         Self::EndError,
         Self::EndErrorPercent,
@@ -90,6 +92,7 @@ impl Metric {
         Self::StrideCountFound,
         Self::StrideCountError,
         Self::StrideLengthRms,
+        Self::StrideLengthStraightRms,
         Self::StrideLengthMeanError,
         Self::StrideLengthsTrue,
         Self::StrideLengthsMissed,
@@ -120,6 +123,7 @@ impl Metric {
             Self::StrideCountFound => "stride_count_found",
             Self::StrideCountError => "stride_count_error",
             Self::StrideLengthRms => "stride_length_rms_m",
+            Self::StrideLengthStraightRms => "stride_length_straight_rms_m",
             Self::StrideLengthMeanError => "stride_length_mean_error_m",
             Self::StrideLengthsTrue => "stride_lengths_true",
             Self::StrideLengthsMissed => "stride_lengths_missed",

@@ -119,21 +119,29 @@ fn found_stances(matching: &Matching, metrics: &mut Metrics) {
 
 /// Strides of known length against the distance of the stances at their ends.
 fn stride_lengths(stances: &[Stance], strides: &[KnownStride], metrics: &mut Metrics) {
-    let errors: Vec<f64> = strides
+    // Error and turn of each.
+    let found: Vec<(f64, f64)> = strides
         .iter()
         .filter_map(|stride| {
             let from = stance_at(stances, stride.start, TOLERANCE_US)?;
             let to = stance_at(stances, stride.end, TOLERANCE_US)?;
-            let found = from.start < to.start;
-            found.then(|| distance(horizontal(from.position), horizontal(to.position)) - stride.length)
+            let length = distance(horizontal(from.position), horizontal(to.position));
+            (from.start < to.start).then(|| (length - stride.length, (to.heading - from.heading).abs()))
         })
         .collect();
-    let count = errors.len() as f64;
+    let errors: Vec<f64> = found.iter().map(|stride| stride.0).collect();
+    let straight: Vec<f64> = found.iter().filter(|stride| stride.1 < STRAIGHT_RAD).map(|stride| stride.0).collect();
+    let rms = |errors: &[f64]| libm::sqrt(errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64);
     metrics.count(Metric::StrideLengthsTrue, strides.len());
     metrics.count(Metric::StrideLengthsMissed, strides.len() - errors.len());
-    metrics.set(Metric::StrideLengthMeanError, errors.iter().sum::<f64>() / count);
-    metrics.set(Metric::StrideLengthRms, libm::sqrt(errors.iter().map(|error| error * error).sum::<f64>() / count));
+    metrics.set(Metric::StrideLengthMeanError, errors.iter().sum::<f64>() / errors.len() as f64);
+    metrics.set(Metric::StrideLengthRms, rms(&errors));
+    metrics.set(Metric::StrideLengthStraightRms, rms(&straight));
 }
+
+/// A stride that turns the foot by less counts as straight: the sensor and a marker a hand's breadth away then go the same
+/// way within some centimetres, whereas a half turn moves one by twice their distance more than the other. **Units:** rad.
+const STRAIGHT_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Labels of standing and moving against the detected stances.
 fn standing_time(stances: &[Stance], labels: &[(Micros, bool)], metrics: &mut Metrics) {
@@ -156,35 +164,39 @@ fn standing_time(stances: &[Stance], labels: &[(Micros, bool)], metrics: &mut Me
 /// Chords shorter than this say too little about a direction to count. **Units:** m.
 const SHORTEST_CHORD_M: f64 = 0.3;
 
-/// Slope of the heading error: the angle from each true chord to its estimate, over time, by least squares weighted with
-/// the square of the chord's length (an end point's error turns a chord by error / length). **Units:** degrees a minute.
+/// More chords than this are thinned: the slopes of all pairs are looked at.
+const MOST_CHORDS: usize = 500;
+
+/// Slope of the heading error: the median of the slopes between all pairs of chords, of the angle from each true chord to
+/// its estimate over time. Surveys have wrong points, and in a curve the chords of two points of one foot differ; neither
+/// moves the median. **Units:** degrees a minute; left is positive.
+///
+/// # Source
+/// Sen, "Estimates of the regression coefficient based on Kendall's tau", J. Am. Stat. Assoc. 63 (1968).
 fn heading_drift(times: &[Micros], estimated: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
-    let mut previous = None;
-    let mut sums = [0.0; 5];
+    let mut errors: Vec<(f64, f64)> = Vec::new();
     for index in 1..times.len() {
         let chord = |points: &[[f64; 2]]| [0, 1].map(|axis| points[index][axis] - points[index - 1][axis]);
         let (from, to) = (chord(truth), chord(estimated));
-        let length = libm::hypot(from[0], from[1]);
-        if length < SHORTEST_CHORD_M || libm::hypot(to[0], to[1]) < SHORTEST_CHORD_M {
+        if libm::hypot(from[0], from[1]).min(libm::hypot(to[0], to[1])) < SHORTEST_CHORD_M {
             continue;
         }
         let mut angle = libm::atan2(from[0] * to[1] - from[1] * to[0], from[0] * to[0] + from[1] * to[1]).to_degrees();
         // The error wanders slowly: the branch next to the one before is meant.
-        if let Some(previous) = previous {
+        if let Some((_, previous)) = errors.last() {
             angle += 360.0 * libm::round((previous - angle) / 360.0);
         }
-        previous = Some(angle);
-        let minutes = times[index].since(times[0]) as f64 / 60.0;
-        let weight = length * length;
-        for (sum, term) in
-            sums.iter_mut().zip([1.0, minutes, minutes * minutes, angle, minutes * angle].map(|term| weight * term))
-        {
-            *sum += term;
-        }
+        errors.push(((times[index] - times[0]) as f64 / 60e6, angle));
     }
-    let [one, t, tt, a, ta] = sums;
-    let spread = one * tt - t * t;
-    (spread > 0.0).then(|| (one * ta - t * a) / spread)
+    let errors: Vec<(f64, f64)> = errors.iter().step_by(errors.len().div_ceil(MOST_CHORDS).max(1)).copied().collect();
+    let later = |index: usize| errors[index + 1..].iter().map(move |other| (index, other));
+    let mut slopes: Vec<f64> = (0..errors.len())
+        .flat_map(later)
+        .filter(|&(index, other)| other.0 > errors[index].0)
+        .map(|(index, other)| (other.1 - errors[index].1) / (other.0 - errors[index].0))
+        .collect();
+    slopes.sort_by(f64::total_cmp);
+    slopes.get(slopes.len() / 2).copied()
 }
 
 /// Step of the search for a clock offset. **Units:** microseconds.
@@ -345,6 +357,7 @@ mod tests {
         let strides = vec![stride(0.2, 1.2, 1.3), stride(1.2, 2.2, 1.5), stride(2.7, 3.2, 1.4)];
         let metrics = score(&track, &Truth { strides: Some(strides), ..Truth::default() });
         assert!((get(&metrics, Metric::StrideLengthRms) - 0.1).abs() < 1e-9);
+        assert!((get(&metrics, Metric::StrideLengthStraightRms) - 0.1).abs() < 1e-9);
         assert!(get(&metrics, Metric::StrideLengthMeanError).abs() < 1e-9);
         assert_eq!((get(&metrics, Metric::StrideLengthsTrue), get(&metrics, Metric::StrideLengthsMissed)), (3.0, 1.0));
     }
