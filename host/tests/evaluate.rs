@@ -237,6 +237,13 @@ fn a_wrong_manifest_is_refused_in_one_line() {
         ("unit = \"mm\"", "unit = \"inch\"", "unknown variant `inch`"),
         ("closed_loop = true", "same_height_as = \"left\"", "same_height_as = 'left' is no other recording"),
         ("closed_loop = true", "closed_loop = yes", "line 27: "),
+        (
+            "path = \"lost.csv\"",
+            "simulate = { detector_test = \"d run\" }",
+            "recording 'lost': simulate: 'd run' is no detector test; known: a normal, ",
+        ),
+        ("path = \"lost.csv\"", "simulate = { scenario = \"x.toml\" }", "recording 'lost': simulate: scenario "),
+        ("path = \"lost.csv\"", "about = \"?\"", "recording 'lost': give either a path or simulate"),
     ] {
         let manifest = MANIFEST.replace(from, to);
         assert_ne!(manifest, MANIFEST, "{from}");

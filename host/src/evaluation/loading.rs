@@ -1,19 +1,35 @@
-//! From the truth files of a manifest to a [`Truth`] in the clock of the recording.
+//! From an entry of a manifest to its samples and its [`Truth`] in the clock of the samples.
 
 use super::manifest::{Entry, Manifest};
 use super::source::{Instants, Layout, Mirrored, Paths, PointsSource, StillSource, StridesSource};
 use super::table::{Table, TableError};
 use super::truth::{KnownStride, Reference, Surveyed, Truth};
-use crate::recording::Recording;
 use crate::recording::mapping::Column;
 use crate::recording::unit::TimeUnit;
+use crate::recording::{self, ProfileError, Recording, RecordingError, SimulatedTruth};
+use crate::simulation::{self, Scenario, Simulation};
 use sohle_shared::time::Micros;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Why the truth of a recording cannot be used.
+/// Why an entry cannot be scored.
 #[derive(Debug, Error)]
-pub enum TruthError {
+pub enum LoadError {
+    /// The file with the samples is not there.
+    #[error("{}: no such file", path.display())]
+    Absent {
+        /// As the manifest has it.
+        path: PathBuf,
+    },
+    /// The samples cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The profile cannot be used.
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+    /// The walk cannot be simulated.
+    #[error("simulate: {0}")]
+    Simulation(String),
     /// The file is not there.
     #[error("truth {}: no such file", path.display())]
     Missing {
@@ -32,8 +48,37 @@ pub enum TruthError {
 /// last period of a slow reference. **Units:** microseconds.
 const OVERHANG_US: i64 = 100_000;
 
+/// One true pose of a simulated walk is kept for so many samples: a hundred in a second.
+const THINNING: usize = 20;
+
+/// Reads or simulates the samples of `entry`.
+pub fn samples(manifest: &Manifest, entry: &Entry) -> Result<Recording, LoadError> {
+    if let Some(source) = &entry.simulate {
+        let scenario = manifest.scenario(source).map_err(LoadError::Simulation)?;
+        return simulated(&scenario).map_err(|error| LoadError::Simulation(error.to_string()));
+    }
+    let named = entry.path.clone().unwrap_or_default();
+    let path = manifest.locate(&named).ok_or(LoadError::Absent { path: named })?;
+    Ok(recording::open(&path, Some(&manifest.profile(entry)?))?)
+}
+
+/// The walk of `scenario` as a recording with its truth.
+fn simulated(scenario: &Scenario) -> Result<Recording, simulation::Error> {
+    let mut recording = Recording::default();
+    let mut truth = SimulatedTruth::default();
+    for (index, moment) in Simulation::new(scenario)?.enumerate() {
+        recording.samples.push(moment.sample);
+        truth.stances.extend(moment.stance);
+        if index % THINNING == 0 || moment.stance.is_some() {
+            truth.poses.push(moment.truth);
+        }
+    }
+    recording.truth = Some(truth);
+    Ok(recording)
+}
+
 /// Reads what is known of `entry`, whose samples are `recording`.
-pub fn read(manifest: &Manifest, entry: &Entry, recording: &Recording) -> Result<Truth, TruthError> {
+pub fn truth(manifest: &Manifest, entry: &Entry, recording: &Recording) -> Result<Truth, LoadError> {
     let source = &entry.truth;
     let open = |paths: &Paths, layout: &Layout| open(manifest, paths, layout);
     let mut truth = Truth {
@@ -56,8 +101,8 @@ pub fn read(manifest: &Manifest, entry: &Entry, recording: &Recording) -> Result
     if let Some(source) = &source.still {
         truth.still = Some(still(&open(&source.path, &source.layout)?, source, recording)?);
     }
-    if source.simulated {
-        let simulated = Truth::from(recording.truth.as_ref().ok_or(TruthError::NotSimulated)?);
+    if source.simulated || entry.simulate.is_some() {
+        let simulated = Truth::from(recording.truth.as_ref().ok_or(LoadError::NotSimulated)?);
         truth.stances = simulated.stances;
         truth.track = simulated.track;
         truth.height_change = truth.height_change.or(simulated.height_change);
@@ -65,13 +110,13 @@ pub fn read(manifest: &Manifest, entry: &Entry, recording: &Recording) -> Result
     Ok(truth)
 }
 
-fn open(manifest: &Manifest, paths: &Paths, layout: &Layout) -> Result<Table, TruthError> {
+fn open(manifest: &Manifest, paths: &Paths, layout: &Layout) -> Result<Table, LoadError> {
     let paths = match paths {
         Paths::One(path) => std::slice::from_ref(path),
         Paths::Any(paths) => paths.as_slice(),
     };
     let found = paths.iter().find_map(|path| manifest.locate(path));
-    let path = found.ok_or_else(|| TruthError::Missing { path: paths.first().cloned().unwrap_or_default() })?;
+    let path = found.ok_or_else(|| LoadError::Missing { path: paths.first().cloned().unwrap_or_default() })?;
     Ok(Table::read(&path, layout)?)
 }
 
@@ -223,7 +268,6 @@ fn within(table: &Table, times: impl Iterator<Item = Micros>, recording: &Record
 mod tests {
     use super::super::alignment::path_length;
     use super::*;
-    use crate::recording;
     use std::path::Path;
 
     /// The truth of a recording of the project's manifest; `None` where the recordings are absent.
@@ -231,9 +275,9 @@ mod tests {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/recordings.toml");
         let manifest = Manifest::read(&path).unwrap();
         let entry = manifest.recordings.iter().find(|entry| entry.name == name).unwrap();
-        let file = manifest.locate(&entry.path)?;
-        let recording = recording::open(&file, Some(&manifest.profile(entry).unwrap())).unwrap();
-        Some((read(&manifest, entry, &recording).unwrap(), recording))
+        manifest.locate(entry.path.as_ref()?)?;
+        let recording = samples(&manifest, entry).unwrap();
+        Some((super::truth(&manifest, entry, &recording).unwrap(), recording))
     }
 
     #[test]

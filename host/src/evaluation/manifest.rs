@@ -7,6 +7,7 @@ use super::group::Group;
 use super::source::TruthSource;
 use crate::recording::mapping::Mapping;
 use crate::recording::{Profile, ProfileError, Source, recordings_dir};
+use crate::simulation::Scenario;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -69,7 +70,9 @@ pub struct Entry {
     /// A sentence for readers of the manifest.
     pub about: Option<String>,
     /// The file with the samples.
-    pub path: PathBuf,
+    pub path: Option<PathBuf>,
+    /// In place of a file: a walk to be simulated, which brings its truth.
+    pub simulate: Option<SimulateSource>,
     /// Preset or mapping file, see [`Source::profile`].
     pub profile: Option<String>,
     /// What differs from the profile.
@@ -77,6 +80,18 @@ pub struct Entry {
     /// What is known of the walk.
     #[serde(default)]
     pub truth: TruthSource,
+}
+
+/// A walk to be simulated: one of `detector_test` and `scenario`.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulateSource {
+    /// Name of one of [`Scenario::detector_tests`].
+    pub detector_test: Option<String>,
+    /// A scenario file as `sohle simulate --print` writes it, beside the manifest.
+    pub scenario: Option<PathBuf>,
+    /// All that is random follows from it.
+    pub seed: Option<u64>,
 }
 
 /// Where a file comes from.
@@ -131,9 +146,29 @@ impl Manifest {
 
     /// How the samples of `entry` are to be read.
     pub fn profile(&self, entry: &Entry) -> Result<Profile, ProfileError> {
-        let source =
-            Source { path: entry.path.clone(), profile: entry.profile.clone(), mapping: entry.mapping.clone() };
-        source.resolve(&self.folder)
+        let path = entry.path.clone().unwrap_or_default();
+        Source { path, profile: entry.profile.clone(), mapping: entry.mapping.clone() }.resolve(&self.folder)
+    }
+
+    /// The walk that `source` asks for, or why there is none.
+    pub fn scenario(&self, source: &SimulateSource) -> Result<Scenario, String> {
+        let seed = source.seed.unwrap_or(1);
+        match (&source.detector_test, &source.scenario) {
+            (Some(wanted), None) => {
+                let tests = Scenario::detector_tests(seed);
+                let known: Vec<&str> = tests.iter().map(|(name, _)| name.as_str()).collect();
+                let unknown = format!("'{wanted}' is no detector test; known: {}", known.join(", "));
+                tests.into_iter().find(|(name, _)| name == wanted).map(|(_, scenario)| scenario).ok_or(unknown)
+            }
+            (None, Some(file)) => {
+                let path = self.folder.join(file);
+                let told = |message: String| format!("scenario {}: {message}", path.display());
+                let text = std::fs::read_to_string(&path).map_err(|error| told(error.to_string()))?;
+                let scenario = Scenario::from_toml(&text).map_err(|error| told(error.to_string()))?;
+                Ok(Scenario { seed: source.seed.unwrap_or(scenario.seed), ..scenario })
+            }
+            _ => Err("give either detector_test or scenario".into()),
+        }
     }
 
     /// The recordings called `names` only, in the order of the manifest; all of them without names.
@@ -160,7 +195,16 @@ impl Manifest {
             if self.recordings[..index].iter().any(|other| other.name == entry.name) {
                 return Err(wrong("the name is used twice".into()));
             }
-            self.profile(entry).map_err(|error| wrong(error.to_string()))?;
+            match (&entry.path, &entry.simulate) {
+                (Some(_), None) => self.profile(entry).map(drop).map_err(|error| wrong(error.to_string()))?,
+                (None, Some(_)) if entry.profile.is_some() || entry.mapping.is_some() => {
+                    return Err(wrong("profile and mapping belong to a path, not to a simulated walk".into()));
+                }
+                (None, Some(source)) => {
+                    self.scenario(source).map(drop).map_err(|message| wrong(format!("simulate: {message}")))?;
+                }
+                _ => return Err(wrong("give either a path or simulate".into())),
+            }
             entry.truth.check().map_err(wrong)?;
             if let Some(other) = &entry.truth.same_height_as
                 && (*other == entry.name || !self.recordings.iter().any(|entry| entry.name == *other))
@@ -197,7 +241,7 @@ mod tests {
     #[test]
     fn the_projects_manifest_is_in_order() {
         let manifest = project();
-        assert_eq!(manifest.recordings.len(), 17);
+        assert_eq!(manifest.recordings.len(), 26);
         for (index, file) in manifest.files.iter().enumerate() {
             assert!(manifest.files[..index].iter().all(|other| other.path != file.path), "{}", file.path.display());
         }
@@ -208,7 +252,7 @@ mod tests {
         let manifest = project();
         let known = |path: &Path| manifest.files.iter().any(|file| file.path == path);
         for entry in &manifest.recordings {
-            assert!(known(&entry.path), "{}", entry.path.display());
+            assert!(entry.path.iter().all(|path| known(path)), "{}", entry.name);
             for paths in entry.truth.paths() {
                 let any = match paths {
                     Paths::One(path) => known(path),
