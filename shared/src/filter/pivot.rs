@@ -113,7 +113,7 @@ impl Default for Parameters {
             accel_clip_sigma: 10.0,
             gap_gyro_sigma: 1.0,
             gap_accel_sigma: 5.0,
-            heading_share: 0.0,
+            heading_share: 0.25,
             vertical_bias_share: 0.0,
             gravity_sigma: 0.05,
             height_sigma: 0.003,
@@ -644,8 +644,9 @@ mod tests {
     }
 
     #[test]
-    fn zero_velocity_leaves_the_heading_and_its_bias_alone() {
+    fn zero_velocity_leaves_considered_heading_and_bias_alone() {
         let mut filter = started(&UP);
+        filter.parameters.heading_share = 0.0;
         let increments = rocking(&Vector3::new(0.0, 0.0, 0.1), 2.0);
         for increment in &increments {
             filter.predict(increment);

@@ -65,7 +65,7 @@ impl Default for Parameters {
             velocity_sigma: 0.01,
             enter: 3.0,
             leave: 6.0,
-            confirm_s: 0.04,
+            confirm_s: 0.02,
             swing_speed: 0.4,
             new_pace_speed: 0.2,
             new_pace_after_s: 0.2,
@@ -168,11 +168,15 @@ impl Adaptive {
             // The foot has not gone anywhere: it was a restless moment of the same stance.
             self.calm_since = Some(time);
             self.standing = true;
-        } else if statistic < (p.enter * stillest).min(p.limit) && !swings {
-            let since = *self.calm_since.get_or_insert(time);
-            self.standing = time - since >= (p.confirm_s * 1e6) as i64;
         } else {
-            self.calm_since = None;
+            // Once it has begun, a stance may be as restless as one that goes on.
+            let bound = if self.calm_since.is_some() { p.leave } else { p.enter };
+            if statistic < (bound * stillest).min(p.limit) && !swings {
+                let since = *self.calm_since.get_or_insert(time);
+                self.standing = time - since >= (p.confirm_s * 1e6) as i64;
+            } else {
+                self.calm_since = None;
+            }
         }
         if self.standing {
             self.stood_until = Some(time);
