@@ -288,7 +288,8 @@ mod tests {
     fn standing_for_long_is_one_stance() {
         let mut detector = Adaptive::new(&Parameters::default());
         let stood = (0..2000).filter(|&i| detector.judge(Micros(i * 10_000), 5.0, at(0.01)).stance).count();
-        assert_eq!(stood, 1996);
+        // All but the two increments that confirm it.
+        assert_eq!(stood, 1998);
     }
 
     #[test]
