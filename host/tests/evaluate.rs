@@ -150,6 +150,12 @@ fn a_manifest_is_enough_to_score_a_walk_of_ones_own() {
         assert_eq!(of("lost", settings)["status"], "skipped");
         assert_eq!(of("lost", settings)["reason"], "lost.csv: no such file");
     }
+    let mine = of("mine", "default");
+    assert_eq!(mine["steps"], 20);
+    assert_eq!(mine["metrics"]["stances_missed"], 0);
+    assert_eq!(mine["metrics"]["stances_invented"], 0);
+    // Noiseless samples of a smooth walk: what is left is integration at 200 Hz, millimetres a stride.
+    assert!(mine["metrics"]["rigid_rmse_m"].as_f64().unwrap() < 0.1, "{mine}");
     assert_eq!(report["summary"]["scored"], 1);
     assert_eq!(report["summary"]["skipped"], serde_json::json!(["lost"]));
     assert_eq!(report["groups"][0]["recordings_used"], 1);
@@ -250,6 +256,7 @@ fn a_wrong_manifest_is_refused_in_one_line() {
         let told = refusal(folder.path(), &manifest);
         assert!(told.starts_with("error: manifest ") && told.contains(part), "{to}: {told}");
     }
+    assert!(refusal(folder.path(), "# nothing\n").ends_with("manifest.toml: lists no [[recording]]"));
     let output = evaluate(folder.path(), MANIFEST, &["--only", "yours"]);
     assert!(
         String::from_utf8_lossy(&output.stderr).contains("no recording 'yours' in the manifest; known: mine, lost")

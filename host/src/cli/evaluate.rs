@@ -2,6 +2,7 @@
 
 use super::{Error, parameters, print};
 use crate::evaluation::{Manifest, Perturbation, Report, Settings, evaluate};
+use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 
 /// Tracks all recordings of a manifest and scores each against its truth
@@ -55,7 +56,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let settings = Settings::both(parameters.unwrap_or_default());
     let perturbations = match args.perturb {
         None => Vec::new(),
-        Some(named) if named.is_empty() => Perturbation::ALL.to_vec(),
+        Some(named) if named.is_empty() => Perturbation::value_variants().to_vec(),
         Some(named) => named,
     };
     let threads = args.threads.map_or(0, std::num::NonZeroUsize::get);
@@ -64,7 +65,6 @@ pub fn run(args: Args) -> Result<(), Error> {
         evaluation: evaluate(&manifest, &settings, Perturbation::Recorded),
         perturbed: perturbations
             .into_iter()
-            .filter(|perturbation| *perturbation != Perturbation::Recorded)
             .map(|perturbation| (perturbation, evaluate(&manifest, &settings, perturbation)))
             .collect(),
     });

@@ -171,13 +171,15 @@ impl Manifest {
         }
     }
 
-    /// The recordings called `names` only, in the order of the manifest; all of them without names.
+    /// The recordings called `names` only, in the order of the manifest, and the groups that have one of them; everything
+    /// without names.
     pub fn only(mut self, names: &[String]) -> Result<Self, String> {
         if let Some(unknown) = names.iter().find(|name| !self.recordings.iter().any(|entry| entry.name == **name)) {
             return Err(format!("no recording '{unknown}' in the manifest; known: {}", self.names()));
         }
         if !names.is_empty() {
             self.recordings.retain(|entry| names.contains(&entry.name));
+            self.groups.retain(|group| group.recordings.iter().any(|name| names.contains(name)));
         }
         Ok(self)
     }
@@ -187,6 +189,9 @@ impl Manifest {
     }
 
     fn check(&self) -> Result<(), String> {
+        if self.recordings.is_empty() {
+            return Err("lists no [[recording]]".into());
+        }
         for (index, entry) in self.recordings.iter().enumerate() {
             let wrong = |message: String| format!("recording '{}': {message}", entry.name);
             if entry.name.trim().is_empty() {

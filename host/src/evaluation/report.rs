@@ -230,7 +230,7 @@ impl Report {
         let settings = self.settings();
         let mut header = vec!["group", "figure"];
         header.extend(&settings);
-        header.extend(["must", "aim", "", "recordings"]);
+        header.extend(["must", "aim", "reached", "recordings"]);
         let mut rows = vec![header.into_iter().map(String::from).collect::<Vec<_>>()];
         for figures in self.evaluation.groups.chunks(settings.len().max(1)) {
             let [first, ..] = figures else { continue };
@@ -321,23 +321,28 @@ fn verdict(figure: &GroupFigure) -> &'static str {
 type Cell = fn(&Outcome) -> String;
 
 /// Title and content of the columns of the first table.
-const COLUMNS: [(&str, Cell); 12] = [
+const COLUMNS: [(&str, Cell); 9] = [
     ("way m", |outcome| outcome.score().map(|score| format!("{:.1}", score.distance)).unwrap_or_default()),
-    ("strides", |outcome| outcome.score().map(|score| score.steps.to_string()).unwrap_or_default()),
-    ("of", |outcome| value(outcome, Metric::StrideCountTrue)),
+    ("strides/true", strides),
+    ("missed+invented/stances", found),
     ("RMSE m", |outcome| value(outcome, Metric::RigidRmse)),
     ("end %", |outcome| value(outcome, Metric::EndErrorPercent)),
-    ("drift °/min", |outcome| value(outcome, Metric::HeadingDrift)),
     ("closure m", |outcome| value(outcome, Metric::ClosureHorizontal)),
     ("closure 3-D m", |outcome| value(outcome, Metric::Closure3d)),
     ("height m", |outcome| value(outcome, Metric::HeightEnd)),
-    ("height m/50 m", |outcome| value(outcome, Metric::HeightPer50m)),
-    ("missed+invented/stances", found),
     ("stride rms m", |outcome| value(outcome, Metric::StrideLengthRms)),
 ];
 
 fn value(outcome: &Outcome, metric: Metric) -> String {
     cell(metric, outcome.score().and_then(|score| score.metrics.get(metric)))
+}
+
+fn strides(outcome: &Outcome) -> String {
+    let Some(score) = outcome.score() else { return String::new() };
+    match score.metrics.get(Metric::StrideCountTrue) {
+        Some(counted) => format!("{}/{counted}", score.steps),
+        None => score.steps.to_string(),
+    }
 }
 
 fn found(outcome: &Outcome) -> String {
