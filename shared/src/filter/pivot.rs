@@ -461,8 +461,10 @@ impl PivotFilter {
         change
     }
 
-    /// The vertical velocity is less certain than the filter believes, by `sigma`. **Units:** m/s.
-    pub fn loosen_vertical_velocity(&mut self, sigma: f32) {
+    /// The ground under the standing foot has begun to move at the vertical velocity `velocity`, known to `sigma`: an
+    /// elevator. **Units:** m/s.
+    pub fn begin_ride(&mut self, velocity: f32, sigma: f32) {
+        self.state.velocity.z += velocity;
         self.covariance[(VELOCITY + 2, VELOCITY + 2)] += sigma * sigma;
     }
 

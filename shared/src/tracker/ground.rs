@@ -70,7 +70,7 @@ pub struct Sight {
 }
 
 /// What follows for the filter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finding {
     /// What the ground does.
     pub mode: FloorMode,
@@ -78,8 +78,8 @@ pub struct Finding {
     pub hold_height: bool,
     /// The foot rides in an elevator now.
     pub riding: bool,
-    /// An elevator ride began with this sight.
-    pub ride_begins: bool,
+    /// An elevator ride began, and is recognised with this sight: the vertical velocity it has reached. **Units:** m/s.
+    pub ride_begins: Option<f32>,
     /// An elevator ride ended with this sight.
     pub ride_ends: bool,
 }
@@ -87,12 +87,17 @@ pub struct Finding {
 /// Time constant of the vertical acceleration. **Units:** s.
 const SMOOTHING_S: f32 = 0.15;
 
+/// A smoothed vertical acceleration beyond this may be the beginning of a ride. **Units:** m/s².
+const FELT: f32 = 0.02;
+
 /// Follows the ground.
 #[derive(Clone, Debug)]
 pub struct Ground {
     parameters: Parameters,
     commanded: Option<FloorMode>,
     push: f32,
+    /// Velocity that the present push, if it is one, has given so far. **Units:** m/s.
+    gained: f32,
     riding: bool,
     stopped_for: f32,
     /// What the stride that ends with this stance did.
@@ -102,7 +107,15 @@ pub struct Ground {
 impl Ground {
     /// On a level floor.
     pub fn new(parameters: &Parameters) -> Self {
-        Self { parameters: *parameters, commanded: None, push: 0.0, riding: false, stopped_for: 0.0, stride: None }
+        Self {
+            parameters: *parameters,
+            commanded: None,
+            push: 0.0,
+            gained: 0.0,
+            riding: false,
+            stopped_for: 0.0,
+            stride: None,
+        }
     }
 
     /// A map knows what the ground does, or (`None`) no longer does.
@@ -116,10 +129,14 @@ impl Ground {
         let Some(standing) = sight.standing else {
             let ride_ends = core::mem::take(&mut self.riding);
             self.push = 0.0;
+            self.gained = 0.0;
             self.stride = None;
-            return Finding { mode: self.mode(), hold_height: false, riding: false, ride_begins: false, ride_ends };
+            return Finding { mode: self.mode(), hold_height: false, riding: false, ride_begins: None, ride_ends };
         };
         self.push += (sight.acceleration - self.push) * (sight.dt / SMOOTHING_S).min(1.0);
+        // A standing foot is held at zero velocity until it is known to ride: what the push gives meanwhile is kept here.
+        let pushed = libm::fabsf(self.push) > FELT && self.push * sight.acceleration > 0.0;
+        self.gained = if pushed { self.gained + sight.acceleration * sight.dt } else { 0.0 };
         let was_riding = self.riding;
         self.follow_ride(sight, standing);
 
@@ -133,7 +150,7 @@ impl Ground {
             mode,
             hold_height: mode == FloorMode::Level && standing >= p.settle_s,
             riding: self.riding,
-            ride_begins: self.riding && !was_riding,
+            ride_begins: (self.riding && !was_riding).then_some(self.gained),
             ride_ends: was_riding && !self.riding,
         }
     }
@@ -231,6 +248,9 @@ mod tests {
             };
             velocity += acceleration * 0.01;
             let finding = ground.observe(&Sight { acceleration, velocity, ..sight(i as f32 * 0.01, 0.0) });
+            if let Some(gained) = finding.ride_begins {
+                assert!((gained - velocity).abs() < 1e-5);
+            }
             modes[usize::from(finding.riding)] += 1;
             ends += usize::from(finding.ride_ends);
         }

@@ -27,8 +27,8 @@ const LOST_SPEED: f32 = 30.0;
 const START_SPREAD: f32 = 3.0;
 /// How far the repeated height updates of a stance reach in which they say all they know. **Units:** s.
 const HEIGHT_TIME_S: f32 = 0.1;
-/// What an elevator's first push has already given it before it is recognised. **Units:** m/s.
-const RIDE_SPEED_SIGMA: f32 = 0.15;
+/// How well the velocity is known that an elevator has when it is recognised. **Units:** m/s.
+const RIDE_SPEED_SIGMA: f32 = 0.05;
 /// How well an elevator stands still when it has stopped. **Units:** m/s.
 const STOP_SIGMA: f32 = 0.01;
 
@@ -188,8 +188,8 @@ impl Own {
     }
 
     fn correct(&mut self, increment: &Increment, velocity_sigma: Option<f32>, finding: &Finding, dt: f32) {
-        if finding.ride_begins {
-            self.filter.loosen_vertical_velocity(RIDE_SPEED_SIGMA);
+        if let Some(velocity) = finding.ride_begins {
+            self.filter.begin_ride(velocity, RIDE_SPEED_SIGMA);
         }
         if finding.ride_ends && self.stance {
             self.filter.update_zero_vertical_velocity(STOP_SIGMA);
