@@ -23,7 +23,9 @@ pub fn run(arguments: &Arguments) -> bool {
     run.check("committed files", check::run);
     run.check("lint", || process::run(&mut cargo("clippy --locked --workspace --all-targets -- -D warnings")));
     run.check("documentation", || {
-        process::run(cargo("doc --locked --workspace --no-deps").env("RUSTDOCFLAGS", "-D warnings"))
+        process::run(
+            cargo("doc --locked --workspace --no-deps --document-private-items").env("RUSTDOCFLAGS", "-D warnings"),
+        )
     });
     run.stage("tests", tests);
     run.stage("documentation tests", || counted(cargo("test --locked --workspace --doc")));

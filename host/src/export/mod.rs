@@ -1,7 +1,7 @@
 //! What a tracked walk leaves behind: pictures, GeoJSON and tables in a folder.
 //!
 //! Everything is a function of the track alone: no date, no machine name, no order of a hash map, so that the same walk
-//! writes the same bytes. Each file is complete or absent ([`file`]).
+//! writes the same bytes. Each file is complete or absent ([`mod@file`]).
 
 pub mod file;
 pub mod geojson;
