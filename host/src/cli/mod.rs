@@ -7,6 +7,7 @@
 
 pub mod convert;
 pub mod demo;
+pub mod endurance;
 mod error;
 pub mod evaluate;
 pub mod parameters;
@@ -43,6 +44,7 @@ enum Command {
     Replay(replay::Args),
     Convert(convert::Args),
     Evaluate(evaluate::Args),
+    Endurance(endurance::Args),
     Parameters(parameters::Args),
     Simulate(simulate::Args),
 }
@@ -78,6 +80,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Replay(args) => replay::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),
+        Command::Endurance(args) => endurance::run(args),
         Command::Parameters(args) => parameters::run(args),
         Command::Simulate(args) => simulate::run(args),
     }
