@@ -159,13 +159,14 @@ fn dot_mark(pen: &mut Pen, at: [f64; 2], mode: FloorMode, radius: f64, fill: &st
 /// others if it were shown whole.
 const STRAY: f64 = 0.3;
 
-/// The range of `values` of what must be seen (the truth and the chosen track), and the rest where there is room.
-fn bounds(lines: &[&Line], values: impl Fn(&Line) -> Vec<f64>) -> Range {
+/// The range of `values` of what must be seen (the truth and the chosen track), and the rest if it does
+/// not need more than `room` metres or [`STRAY`].
+fn bounds(lines: &[&Line], room: f64, values: impl Fn(&Line) -> Vec<f64>) -> Range {
     let range = |wanted: &dyn Fn(Role) -> bool| {
         Range::of(lines.iter().filter(|line| wanted(line.role)).flat_map(|line| values(line)))
     };
     match (range(&|role| role != Role::Documented), range(&|_| true)) {
-        (Some(must), Some(all)) => must.reaching(all, STRAY * must.length().max(1.0)),
+        (Some(must), Some(all)) => must.reaching(all, (STRAY * must.length()).max(room)),
         (_, all) => all.unwrap_or(Range { from: 0.0, to: 0.0 }),
     }
 }
@@ -184,7 +185,7 @@ struct Plan {
 impl Plan {
     fn of(lines: &[&Line], top: f64) -> Self {
         let room = |axis: usize| {
-            let range = bounds(lines, |line| line.dots.iter().map(|dot| dot.position[axis]).collect());
+            let range = bounds(lines, 1.0, |line| line.dots.iter().map(|dot| dot.position[axis]).collect());
             range.padded(0.3 + 0.05 * range.length()).at_least(2.0)
         };
         let (x, y) = (room(0), room(1));
@@ -322,8 +323,8 @@ struct Strip {
 
 impl Strip {
     fn of(lines: &[&Line], top: f64) -> Self {
-        let longest = bounds(lines, |line| distances(line).collect()).to.max(1.0);
-        let height = bounds(lines, |line| heights(line).collect());
+        let longest = bounds(lines, 1.0, |line| distances(line).collect()).to.max(1.0);
+        let height = bounds(lines, 10.0, |line| heights(line).collect());
         Self {
             top,
             bottom: top + STRIP_HEIGHT,
