@@ -10,7 +10,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// The range of the finite ones of `values`; `None` if there is none.
+    /// The range of `values` but for those that are not finite; `None` if no other is there.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         values.into_iter().filter(|value| value.is_finite()).fold(None, |range: Option<Self>, value| {
             Some(range.map_or(Self { from: value, to: value }, |range| Self {

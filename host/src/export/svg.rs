@@ -19,6 +19,9 @@ const ROW: f64 = 24.0;
 const ARROW_SPACING: f64 = 130.0;
 const SHORTEST_WITH_ARROW: f64 = 8.0;
 
+/// A quarter of the Earth's circumference.
+const FARTHEST_M: f64 = 1e7;
+
 const PAPER: &str = "#ffffff";
 const FIELD: &str = "#fafaf8";
 const GRID: &str = "#e4e4df";
@@ -35,9 +38,10 @@ const SMALL: Lettering = Lettering { size: 13.0, colour: FAINT, anchor: Anchor::
 /// Draws the picture.
 pub fn draw(picture: &Picture) -> String {
     let mut pen = Pen::new();
-    let mut lines: Vec<&Line> = picture.lines.iter().collect();
+    let mut earthly: Vec<Line> = picture.lines.iter().map(earthly).collect();
     // What matters most lies on top; the sort is stable.
-    lines.sort_by_key(|line| line.role);
+    earthly.sort_by_key(|line| line.role);
+    let lines: Vec<&Line> = earthly.iter().collect();
     let shades = Shades::of(&lines);
 
     let table = header(&mut pen, picture, &lines);
@@ -58,6 +62,15 @@ pub fn draw(picture: &Picture) -> String {
     }
     pen.unclip();
     pen.finish(WIDTH, strip.bottom + 48.0, PAPER)
+}
+
+/// A line without the points that lie nowhere on Earth: grids and pixels have no numbers for them.
+fn earthly(line: &Line) -> Line {
+    let on_earth = |position: &[f64; 3]| position.iter().all(|value| value.abs() < FARTHEST_M);
+    let mut line = line.clone();
+    line.dots.retain(|dot| on_earth(&dot.position));
+    line.foot.retain(on_earth);
+    line
 }
 
 /// Title, figures, and the table that is the legend too. Returns where it ends.
@@ -278,19 +291,17 @@ impl Plan {
             return;
         };
         let (start, end) = (self.at(first.position), self.at(last.position));
-        pen.circle(start, 7.0, PAPER, (INK, 2.2));
-        // Beside each other where the walk ends near its start.
+        // Away from each other where the walk ends near its start, else away from the edge.
         let near = (start[0] - end[0]).hypot(start[1] - end[1]) < 70.0;
-        let side = if near && end[0] < start[0] || !near && start[0] > RIGHT - 60.0 { -1.0 } else { 1.0 };
-        self.name(pen, start, "start", side);
-        let side = if near {
-            -side
-        } else if end[0] > RIGHT - 60.0 {
-            -1.0
-        } else {
-            1.0
+        let inward = |[x, _]: [f64; 2]| if x > RIGHT - 60.0 { -1.0 } else { 1.0 };
+        let (start_side, end_side) = match (near, end[0] < start[0]) {
+            (true, true) => (1.0, -1.0),
+            (true, false) => (-1.0, 1.0),
+            (false, _) => (inward(start), inward(end)),
         };
-        self.name(pen, end, "end", side);
+        self.name(pen, start, "start", start_side);
+        self.name(pen, end, "end", end_side);
+        pen.circle(start, 7.0, PAPER, (INK, 2.2));
     }
 
     /// Says which tracks leave the picture, and how far from the start they get.
@@ -466,10 +477,17 @@ mod tests {
         assert!(draw(&Picture::default()).contains("no steps were found"));
     }
 
+    /// Of ordinary size, of the size of the Earth, and anything that a number can be.
+    fn number() -> impl proptest::strategy::Strategy<Value = f64> {
+        proptest::prop_oneof![-50.0..50.0_f64, -2e7..2e7_f64, proptest::num::f64::ANY]
+    }
+
     proptest::proptest! {
         /// Law: whatever numbers a track holds, the picture is an SVG of ordinary size.
         #[test]
-        fn any_numbers_are_drawn(places in proptest::collection::vec(proptest::array::uniform3(proptest::num::f64::ANY), 0..8)) {
+        fn any_numbers_are_drawn(
+            places in proptest::collection::vec(proptest::array::uniform3(number()), 0..8),
+        ) {
             let dots = places.into_iter().map(|position| Dot { position, mode: FloorMode::Level }).collect();
             let mut picture = Picture::new("Any");
             let (label, cells) = ("any".to_owned(), Vec::new());
