@@ -96,9 +96,9 @@ impl Track {
         [origin[0] + cos * x - sin * y, origin[1] + sin * x + cos * y, origin[2] + z]
     }
 
-    /// Strides walked: the start is not one.
+    /// Strides walked. The start is not one, nor is a ride in an elevator, which ends in the stance it began in.
     pub fn strides(&self) -> usize {
-        self.steps.len().saturating_sub(1)
+        self.steps.windows(2).filter(|pair| pair[1].stance_start != pair[0].stance_start).count()
     }
 
     /// Horizontal length of the track. **Units:** m.
