@@ -1,4 +1,5 @@
-//! The same input must give the same output: in debug and release builds, on one thread and on two.
+//! The same input must give the same output: in debug and release builds, on one thread and on two, and as it was when the
+//! accuracy table was last written.
 
 use crate::process::{self, Failure};
 use std::process::Command;
@@ -15,9 +16,13 @@ struct Recording {
     status: String,
 }
 
+/// The table that `sohle evaluate` printed last; a change of accuracy shows as a change of this file.
+const TABLE: &str = "tests/accuracy.txt";
+
 /// Runs the evaluation in all ways and compares the hash over everything it put out.
 pub fn run() -> Result<(), Failure> {
     let mut seen: Vec<(String, String)> = Vec::new();
+    let mut whole = true;
     for profile in ["dev", "release"] {
         process::run(&mut cargo("build", profile))?;
         for threads in ["1", "2"] {
@@ -27,10 +32,25 @@ pub fn run() -> Result<(), Failure> {
             let way = format!("{profile} build, {threads} threads");
             let scored = scores.recordings.iter().filter(|recording| recording.status == "scored").count();
             println!("{} {way}: {scored} of {} results scored", scores.outputs_hash, scores.recordings.len());
+            whole &= scored == scores.recordings.len();
             seen.push((way, scores.outputs_hash));
         }
     }
-    compare(&seen)
+    compare(&seen)?;
+    if !whole {
+        println!("not all recordings are here, so {TABLE} is not compared");
+        return Ok(());
+    }
+    let table = std::fs::read_to_string(crate::root().join(TABLE)).map_err(|error| Failure::Found(format!("{TABLE}: {error}")))?;
+    is_of(&table, &seen[0].1)
+}
+
+fn is_of(table: &str, hash: &str) -> Result<(), Failure> {
+    if table.contains(hash) {
+        return Ok(());
+    }
+    let cure = format!("if that is meant, look at what 'sohle evaluate > {TABLE}' changes and commit it");
+    Err(Failure::Found(format!("{TABLE} is of other outputs than {hash}; {cure}")))
 }
 
 fn cargo(verb: &str, profile: &str) -> Command {
@@ -65,6 +85,12 @@ mod tests {
         assert!(compare(&seen(["a", "a", "a"])).is_ok());
         let told = compare(&seen(["a", "a", "b"])).err().map(|failure| failure.to_string()).unwrap_or_default();
         assert_eq!(told, "the outputs differ: dev build, 2 threads gives a, release build, 1 threads gives b");
+    }
+
+    #[test]
+    fn a_table_of_other_outputs_is_refused() {
+        assert!(is_of("outputs hash ab12\n", "ab12").is_ok());
+        assert!(is_of("outputs hash ab12\n", "cd34").is_err());
     }
 
     #[test]
