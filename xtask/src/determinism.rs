@@ -41,7 +41,8 @@ pub fn run() -> Result<(), Failure> {
         println!("not all recordings are here, so {TABLE} is not compared");
         return Ok(());
     }
-    let table = std::fs::read_to_string(crate::root().join(TABLE)).map_err(|error| Failure::Found(format!("{TABLE}: {error}")))?;
+    let table = std::fs::read_to_string(crate::root().join(TABLE))
+        .map_err(|error| Failure::Found(format!("{TABLE}: {error}")))?;
     is_of(&table, &seen[0].1)
 }
 
