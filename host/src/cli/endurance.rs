@@ -10,10 +10,8 @@ use std::path::PathBuf;
 
 /// Simulates walking for hours to months and compares the steps of the first hour with those of the last
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "A day at 200 Hz takes about half a minute, a month a quarter of an hour; nothing is kept in memory.\n\n\
-Example:\n  sohle endurance --days 30"
-)]
+#[command(after_help = "A day at 200 Hz takes about a minute, a month half an hour; nothing is kept in memory.\n\n\
+Example:\n  sohle endurance --days 30")]
 pub struct Args {
     /// How long the person walks
     #[arg(long, value_name = "DAYS", default_value_t = 1.0)]
@@ -96,7 +94,9 @@ fn table(windows: &[Window]) -> Table {
     };
     // An hour that was cut short says little.
     let whole: Vec<_> = windows.iter().filter(|window| 2 * window.stances > windows[0].stances).collect();
-    for at in [0, whole.len() / 4, whole.len() / 2, 3 * whole.len() / 4, whole.len().saturating_sub(1)] {
+    let mut hours = vec![0, whole.len() / 4, whole.len() / 2, 3 * whole.len() / 4, whole.len().saturating_sub(1)];
+    hours.dedup();
+    for at in hours {
         let name = format!("hour {}", at + 1);
         if let Some(window) = whole.get(at) {
             row(name, window);
