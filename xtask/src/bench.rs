@@ -6,7 +6,7 @@
 use crate::cost::{self, Cost};
 use crate::process::{self, Failure};
 use crate::tools;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 /// Sampling of the counted walks. **Units:** microseconds.
@@ -18,7 +18,7 @@ const LARGEST_SHARE: f64 = 0.5;
 /// Prints what samples and filter steps cost with both settings. An error when the default filter costs too much.
 pub fn run() -> Result<(), Failure> {
     tools::VALGRIND.required()?;
-    let program = build()?;
+    let program = process::build("release", "--example", "cost")?;
     let both = |part: &'static str, period_us| {
         let default = count(&program, "default", part, period_us)?;
         Ok::<_, Failure>((part, default, count(&program, "documented", part, period_us)?))
@@ -39,16 +39,6 @@ pub fn run() -> Result<(), Failure> {
     Err(Failure::Found(format!(
         "a prediction of the default filter costs {share:.2} of a documented one; it must stay below {LARGEST_SHARE}"
     )))
-}
-
-fn build() -> Result<PathBuf, Failure> {
-    let words = ["build", "--release", "--locked", "--package", "sohle-shared", "--example", "cost"];
-    process::run(process::cargo().args(words))?;
-    // Built now: the second call only says where it is, wherever the target folder of this machine may be.
-    let said = process::read(process::cargo().args(words).args(["--message-format", "json"]))?;
-    let messages = said.out.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
-    let built = messages.filter_map(|message| message.get("executable")?.as_str().map(PathBuf::from)).next_back();
-    built.ok_or_else(|| Failure::Found("cargo built no example `cost`".into()))
 }
 
 fn count(program: &Path, setting: &str, part: &str, period_us: u32) -> Result<Cost, Failure> {

@@ -24,10 +24,10 @@ pub fn run() -> Result<(), Failure> {
     let mut seen: Vec<(String, String)> = Vec::new();
     let mut whole = true;
     for profile in ["dev", "release"] {
-        process::run(&mut cargo("build", profile))?;
+        let program = process::build(profile, "--bin", "sohle")?;
         for threads in ["1", "2"] {
-            let mut command = cargo("run", profile);
-            command.args(["--quiet", "--", "evaluate", "--format", "json", "--threads", threads]);
+            let mut command = Command::new(&program);
+            command.current_dir(crate::root()).args(["evaluate", "--format", "json", "--threads", threads]);
             let scores = read(&process::read(&mut command)?.out)?;
             let way = format!("{profile} build, {threads} threads");
             let scored = scores.recordings.iter().filter(|recording| recording.status == "scored").count();
@@ -52,12 +52,6 @@ fn is_of(table: &str, hash: &str) -> Result<(), Failure> {
     }
     let cure = format!("if that is meant, look at what 'sohle evaluate > {TABLE}' changes and commit it");
     Err(Failure::Found(format!("{TABLE} is of other outputs than {hash}; {cure}")))
-}
-
-fn cargo(verb: &str, profile: &str) -> Command {
-    let mut command = process::cargo();
-    command.args([verb, "--locked", "--package", "sohle", "--bin", "sohle", "--profile", profile]);
-    command
 }
 
 fn read(text: &str) -> Result<Scores, Failure> {

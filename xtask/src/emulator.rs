@@ -3,6 +3,7 @@
 use crate::cost::{self, Cost};
 use crate::process::{self, Failure, Said};
 use crate::{device, in_root, tools};
+use std::process::Command;
 use std::time::Duration;
 
 /// An emulated run takes seconds; this is for one that hangs.
@@ -14,9 +15,7 @@ pub fn run() -> Result<(), Failure> {
     let route = device::Route::find()?;
     process::run(&mut route.build(&in_root("firmware/emulator")))?;
     let emulated = emulate()?.out;
-    let mut command = process::cargo();
-    command.args(["run", "--quiet", "--locked", "--package", "sohle-shared", "--example", "selftest"]);
-    let native = process::read(&mut command)?.out;
+    let native = process::read(&mut Command::new(process::build("dev", "--example", "selftest")?))?.out;
 
     let pairs = compare(&lines(&native, ""), &lines(&emulated, "bits "))?;
     println!("{pairs} fingerprints of host and Cortex-M4F are equal:");

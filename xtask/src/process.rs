@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Write};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -59,6 +60,19 @@ pub fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(crate::root());
     command
+}
+
+/// Builds a program of the workspace and tells where it is. `kind` is `--bin` or `--example`.
+///
+/// The whole workspace is named so that features are unified as in the tests, whose libraries are then built already.
+pub fn build(profile: &str, kind: &str, name: &str) -> Result<PathBuf, Failure> {
+    let words = ["build", "--locked", "--workspace", "--profile", profile, kind, name];
+    run(cargo().args(words))?;
+    // Built now: the second call only says where, wherever the target folder of this machine may be.
+    let said = read(cargo().args(words).args(["--message-format", "json"]))?;
+    let messages = said.out.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+    let built = messages.filter_map(|message| message.get("executable")?.as_str().map(PathBuf::from)).next_back();
+    built.ok_or_else(|| Failure::Found(format!("cargo built no `{name}`")))
 }
 
 /// A program and its arguments in the root of the checkout.
