@@ -71,6 +71,7 @@ struct JsonSummary<'a> {
 #[derive(Serialize)]
 struct JsonPerturbed<'a> {
     perturbation: &'static str,
+    recordings: Vec<JsonRecording<'a>>,
     groups: Vec<JsonFigure<'a>>,
 }
 
@@ -110,6 +111,7 @@ impl Report {
             perturbed: perturbed
                 .map(|(perturbation, evaluation)| JsonPerturbed {
                     perturbation: perturbation.name(),
+                    recordings: evaluation.outcomes.iter().map(json_recording).collect(),
                     groups: evaluation.groups.iter().map(json_figure).collect(),
                 })
                 .collect(),
