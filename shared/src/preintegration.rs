@@ -4,7 +4,9 @@
 //! The strapdown integration runs at the rate of the sensor, so nothing of a heel strike is lost; the filter and the
 //! stance detector run once per increment. An increment is expressed in the sensor frame of its first moment, so it does
 //! not depend on any state (Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", IEEE
-//! Trans. Robotics 33(1), 2017, without the bias Jacobians: a bias changes too little within an increment).
+//! Trans. Robotics 33(1), 2017, without the bias Jacobians: a bias changes too little within an increment). The turn of
+//! an interval has a coning term (Bortz, "A new mathematical formulation for strapdown inertial navigation", IEEE Trans.
+//! Aerospace and Electronic Systems 7(1), 1971), so that a slow sensor loses little of a foot that turns about two axes.
 
 use crate::sample::{AccelBias, GyroBias, ImuSample};
 use crate::so3;
@@ -129,13 +131,17 @@ impl Preintegrator {
         let accel_before = last.accel.corrected(accel_bias).0;
 
         let increment = self.current.get_or_insert_with(|| Increment::empty(last.time));
-        // Trapezoidal rule; the specific force is turned by the attitude in the middle of the interval.
-        let rate = (gyro + gyro_before) * 0.5;
-        let halfway = increment.turn * so3::exp(&(rate * (0.5 * dt)));
-        let force = halfway * ((accel + accel_before) * 0.5);
-        increment.position += increment.velocity * dt + force * (0.5 * dt * dt);
-        increment.velocity += force * dt;
-        increment.turn *= so3::exp(&(rate * dt));
+        // Trapezoidal rule, for the forces in the frame of the increment. Over a swing, which begins and ends near zero, it is
+        // far better than its order: its errors are differences that cancel. What does not cancel is what a turning axis makes
+        // of them. A rate linear in time leaves 1/12 of the product; that the rule cuts the peaks of the rates leaves as much.
+        let known = !(sample.clipped.gyro || last.clipped.gyro);
+        let coning = gyro_before.cross(&gyro) * if known { dt * dt / 6.0 } else { 0.0 };
+        let turn = (gyro + gyro_before) * (0.5 * dt) + coning;
+        let before = increment.turn * accel_before;
+        increment.turn *= so3::exp(&turn);
+        let after = increment.turn * accel;
+        increment.position += increment.velocity * dt + (before * 2.0 + after) * (dt * dt / 6.0);
+        increment.velocity += (before + after) * (0.5 * dt);
 
         increment.end = sample.time;
         increment.samples = increment.samples.saturating_add(1);
@@ -196,6 +202,54 @@ mod tests {
         // 2000 roundings of a velocity below 1.
         assert!((velocity - expected).norm() < 2e-5);
         assert!((so3::log(&turn) - Vector3::new(0.0, 0.0, 2.0)).norm() < 2e-5);
+    }
+
+    /// Errors of attitude and velocity at the end of a motion in free space that ends at rest, sampled at 60 Hz.
+    fn integrated(seconds: f32, motion: impl Fn(f32) -> (UnitQuaternion<f32>, Vector3<f32>)) -> (f32, f32) {
+        let (period, fine) = (1.0 / 60.0, 1e-3);
+        let samples: Vec<_> = (0..=(seconds / period + 0.5) as i64)
+            .map(|i| {
+                let time = i as f32 * period;
+                let (before, after) = (motion(time - 0.5 * fine).0, motion(time + 0.5 * fine).0);
+                let (attitude, acceleration) = motion(time);
+                let rate = so3::box_minus(&after, &before) / fine;
+                let force = attitude.inverse_transform_vector(&acceleration);
+                ImuSample::new(Micros::from_seconds(f64::from(time)), force.into(), rate.into())
+            })
+            .collect();
+        let (mut attitude, mut velocity) = (motion(0.0).0, Vector3::zeros());
+        for increment in gather(&samples) {
+            velocity += attitude * increment.velocity;
+            attitude *= increment.turn;
+        }
+        (so3::box_minus(&attitude, &motion(seconds).0).norm(), velocity.norm())
+    }
+
+    #[test]
+    fn an_axis_that_turns_costs_a_slow_sensor_no_attitude() {
+        // Coning by 0.2 rad, three times a second. The rates alone drift by
+        // 3 Hz * pi * 0.2^2 * (2 pi 3/60)^2/3 = 12 mrad/s; a tenth of that may be left.
+        let cone = |time: f32| {
+            let (sin, cos) = libm::sincosf(core::f32::consts::TAU * 3.0 * time);
+            (so3::exp(&(Vector3::new(cos, sin, 0.0) * 0.2)), Vector3::zeros())
+        };
+        let (angle, _) = integrated(10.0, cone);
+        assert!(angle < 0.012, "{angle} rad after 10 s");
+    }
+
+    #[test]
+    fn a_swing_sampled_at_60_hz_ends_at_rest() {
+        // 1.4 m in 0.6 s on a path of minimum jerk, the foot pitching by a radian to and fro: peaks of 23 m/s^2, 10 rad/s.
+        let swing = |time: f32| {
+            let u = (time / 0.6).clamp(0.0, 1.0);
+            let acceleration = 1.4 * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / 0.36;
+            let w = u * (1.0 - u);
+            let pitch = 60.0 * w * w * w * (1.0 - 2.0 * u) * 4.0;
+            (so3::exp(&Vector3::new(0.1, pitch, 0.0)), Vector3::new(acceleration, 0.0, 0.0))
+        };
+        let (angle, speed) = integrated(0.6, swing);
+        // With the force turned by the attitude between the samples instead of at them: 0.041 m/s.
+        assert!(angle < 1e-3 && speed < 0.015, "{angle} rad, {speed} m/s");
     }
 
     #[test]
