@@ -22,10 +22,12 @@ pub enum Perturbation {
     XVertical,
     /// Sensor turned by 78 degrees about an axis that is none of its own
     OddAngle,
-    /// Every second sample left out
+    /// Every second sample left out, so that what is faster folds back: no sensor does this
     HalfRate,
     /// Two samples averaged into one
     HalfRateAveraged,
+    /// What a sensor at half the rate and with a low-pass for it records
+    HalfRateFiltered,
     /// White noise of the BMX055 added
     Noise,
 }
@@ -39,13 +41,14 @@ const SEED: u128 = 0x05EE_D0F5_01E5;
 
 impl Perturbation {
     /// All of them, the unchanged recording first.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Recorded,
         Self::UpsideDown,
         Self::XVertical,
         Self::OddAngle,
         Self::HalfRate,
         Self::HalfRateAveraged,
+        Self::HalfRateFiltered,
         Self::Noise,
     ];
 
@@ -58,6 +61,7 @@ impl Perturbation {
             Self::OddAngle => "odd-angle",
             Self::HalfRate => "half-rate",
             Self::HalfRateAveraged => "half-rate-averaged",
+            Self::HalfRateFiltered => "half-rate-filtered",
             Self::Noise => "noise",
         }
     }
@@ -71,6 +75,7 @@ impl Perturbation {
             Self::OddAngle => turned(samples, Vector3::new(0.7, -1.1, 0.4)),
             Self::HalfRate => samples.iter().step_by(2).copied().collect(),
             Self::HalfRateAveraged => samples.chunks_exact(2).map(|pair| averaged(&pair[0], &pair[1])).collect(),
+            Self::HalfRateFiltered => filtered(samples).into_iter().step_by(2).collect(),
             Self::Noise => noisy(samples),
         }
     }
@@ -95,6 +100,38 @@ fn averaged(first: &ImuSample, second: &ImuSample) -> ImuSample {
     sample.clipped.accel |= first.clipped.accel;
     sample.clipped.gyro |= first.clipped.gyro;
     sample
+}
+
+/// Samples on each side that a filtered one is made of.
+const REACH: i32 = 7;
+
+/// Half of the band left: a sinc under a Hamming window (Oppenheim, Schafer: "Discrete-Time Signal Processing", 7.5), no
+/// delay. Beyond the ends the first and the last sample go on.
+fn filtered(samples: &[ImuSample]) -> Vec<ImuSample> {
+    let weights: Vec<(i32, f32)> = (-REACH..=REACH)
+        .map(|k| {
+            let x = PI * k as f32 / 2.0;
+            let sinc = if k == 0 { 1.0 } else { libm::sinf(x) / x };
+            (k, sinc * (0.54 + 0.46 * libm::cosf(PI * k as f32 / (REACH + 1) as f32)))
+        })
+        .collect();
+    let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
+    let filter = |at: usize| {
+        let mut sample = samples[at];
+        (sample.accel.0, sample.gyro.0) = (Vector3::zeros(), Vector3::zeros());
+        for &(k, weight) in &weights {
+            let other = &samples[at.saturating_add_signed(k as isize).min(samples.len() - 1)];
+            sample.accel.0 += other.accel.0 * (weight / sum);
+            sample.gyro.0 += other.gyro.0 * (weight / sum);
+            // The others weigh too little for a reading at the end of the range to spoil them.
+            if k.abs() <= 1 {
+                sample.clipped.accel |= other.clipped.accel;
+                sample.clipped.gyro |= other.clipped.gyro;
+            }
+        }
+        sample
+    };
+    (0..samples.len()).map(filter).collect()
 }
 
 /// Adds noise up to half of the sample rate: density times the root of that bandwidth.
@@ -161,6 +198,27 @@ mod tests {
         let averaged = Perturbation::HalfRateAveraged.apply(&walk);
         assert_eq!((averaged.len(), averaged[0].time), (1000, Micros(2500)));
         assert!((averaged[1].accel.0.x - 0.025).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_filter_keeps_what_half_the_rate_can_tell_and_nothing_else() {
+        let wave = |period: f32| {
+            let sample = |k: i64| {
+                let x = (2.0 * PI * k as f32 / period).sin();
+                ImuSample::new(Micros(k * 5000), [x, 1.0, 9.81], [0.0, x, 0.5])
+            };
+            (0..401).map(sample).collect::<Vec<_>>()
+        };
+        let left = |period| {
+            let filtered = Perturbation::HalfRateFiltered.apply(&wave(period));
+            assert_eq!(filtered.len(), 201);
+            // Away from the ends.
+            filtered[20..180].iter().map(|sample| sample.accel.0.x.abs()).fold(0.0, f32::max)
+        };
+        // A tenth of the rate passes, four tenths would fold back. 15 weights reach 0.3 % of either.
+        assert!((left(10.0) - 1.0).abs() < 0.06, "{}", left(10.0));
+        assert!(left(2.5) < 0.01, "{}", left(2.5));
+        assert_eq!(Perturbation::HalfRateFiltered.apply(&[]), []);
     }
 
     #[test]
