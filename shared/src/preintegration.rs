@@ -8,7 +8,7 @@
 //! an interval has a coning term (Bortz, "A new mathematical formulation for strapdown inertial navigation", IEEE Trans.
 //! Aerospace and Electronic Systems 7(1), 1971), so that a slow sensor loses little of a foot that turns about two axes.
 
-use crate::sample::{AccelBias, GyroBias, ImuSample};
+use crate::sample::{AccelBias, ClippedSamples, GyroBias, ImuSample};
 use crate::so3;
 use crate::time::Micros;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -61,6 +61,8 @@ pub struct Increment {
     pub accel_clipped: f32,
     /// Sum of the squared intervals at which the gyroscope was clipped. **Units:** s².
     pub gyro_clipped: f32,
+    /// How many samples were clipped.
+    pub clipped: ClippedSamples,
     /// The increment is a hole in the samples, and nothing is known of it but its length.
     pub gap: bool,
 }
@@ -82,6 +84,7 @@ impl Increment {
             gyro_jump: 0.0,
             accel_clipped: 0.0,
             gyro_clipped: 0.0,
+            clipped: ClippedSamples::default(),
             gap: false,
         }
     }
@@ -153,6 +156,7 @@ impl Preintegrator {
         increment.gyro_jump += (gyro - gyro_before).norm_squared();
         increment.accel_clipped += if sample.clipped.accel { dt * dt } else { 0.0 };
         increment.gyro_clipped += if sample.clipped.gyro { dt * dt } else { 0.0 };
+        increment.clipped.count(sample.clipped);
 
         // Half an interval early or late is as near to the period as the samples allow.
         if increment.duration() + 0.5 * dt < self.parameters.period_s {
@@ -276,6 +280,7 @@ mod tests {
         assert!((jumps - 2.0 * 157.0 * 157.0).abs() < 1.0);
         assert!((struck[0].accel_clipped - 2.5e-5).abs() < 1e-9);
         assert_eq!(struck[0].gyro_clipped, 0.0);
+        assert_eq!(struck[0].clipped, ClippedSamples { accel: 1, gyro: 0 });
     }
 
     proptest! {

@@ -90,6 +90,29 @@ pub struct Clipped {
     pub gyro: bool,
 }
 
+/// How many samples stood at the end of a range. A count that would exceed its type stays at the largest value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ClippedSamples {
+    /// Of the accelerometer.
+    pub accel: u16,
+    /// Of the gyroscope.
+    pub gyro: u16,
+}
+
+impl ClippedSamples {
+    /// Counts a sample.
+    pub fn count(&mut self, clipped: Clipped) {
+        self.add(Self { accel: u16::from(clipped.accel), gyro: u16::from(clipped.gyro) });
+    }
+
+    /// Adds what was counted elsewhere.
+    pub fn add(&mut self, other: Self) {
+        self.accel = self.accel.saturating_add(other.accel);
+        self.gyro = self.gyro.saturating_add(other.gyro);
+    }
+}
+
 /// One reading of accelerometer and gyroscope at the same moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuSample {
@@ -125,6 +148,15 @@ mod tests {
         assert!(Counts([-2048, 0, 0]).saturated(12));
         assert!(!Counts([2046, -2046, 0]).saturated(12));
         assert!(Counts([0, 0, i16::MIN]).saturated(16));
+    }
+
+    #[test]
+    fn counts_of_clipped_samples_stay_at_the_largest() {
+        let mut counts = ClippedSamples { accel: u16::MAX - 1, gyro: 0 };
+        for _ in 0..3 {
+            counts.count(Clipped { accel: true, gyro: false });
+        }
+        assert_eq!(counts, ClippedSamples { accel: u16::MAX, gyro: 0 });
     }
 
     #[test]

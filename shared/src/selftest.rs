@@ -247,6 +247,7 @@ impl Fingerprint {
             quality.repaired,
         ];
         self.word(flags.iter().fold(0, |bits, &flag| bits << 1 | u32::from(flag)));
+        self.word(u32::from(step.clipped.accel) << 16 | u32::from(step.clipped.gyro));
     }
 }
 

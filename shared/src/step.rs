@@ -6,6 +6,7 @@
 //! filter, graph, fusion) turns it by the heading it believes in (SPEC section 8, decisions 4 and 5). The heading of the
 //! foot is defined up to a constant that depends on how the sensor sits on the shoe; only turns matter.
 
+use crate::sample::ClippedSamples;
 use crate::time::Micros;
 use nalgebra::{Matrix4, Vector3};
 
@@ -59,6 +60,8 @@ pub struct Step {
     pub mode: FloorMode,
     /// What should be known before the step is trusted.
     pub quality: StepQuality,
+    /// How many samples stood at the end of a range since the previous step.
+    pub clipped: ClippedSamples,
 }
 
 impl Step {

@@ -151,6 +151,7 @@ mod tests {
             covariance: Matrix4::zeros(),
             mode: FloorMode::Level,
             quality: StepQuality::default(),
+            clipped: Default::default(),
         }
     }
 

@@ -83,6 +83,7 @@ pub(crate) mod synthetic {
     //! Tracks made up for the tests of this module.
     use crate::track::Track;
     use nalgebra::{Matrix4, Vector3};
+    use sohle_shared::sample::ClippedSamples;
     use sohle_shared::step::{FloorMode, Step, StepQuality};
     use sohle_shared::time::Micros;
 
@@ -106,6 +107,7 @@ pub(crate) mod synthetic {
                 covariance: Matrix4::from_diagonal_element(1e-4),
                 mode: if stairs { FloorMode::Stairs } else { FloorMode::Level },
                 quality: StepQuality { gyro_clipped: index == 3, ..StepQuality::default() },
+                clipped: ClippedSamples { accel: 0, gyro: if index == 3 { 7 } else { 0 } },
             });
         }
         track

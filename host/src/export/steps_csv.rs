@@ -12,7 +12,7 @@ use std::fmt::Write;
 pub const HEADER: &str = "index,stance_start_s,stance_end_s,forward_m,left_m,up_m,turn_rad,length_m,\
 cov_forward_forward_m2,cov_forward_left_m2,cov_forward_up_m2,cov_forward_turn_m_rad,cov_left_left_m2,cov_left_up_m2,\
 cov_left_turn_m_rad,cov_up_up_m2,cov_up_turn_m_rad,cov_turn_turn_rad2,mode,accel_clipped,gyro_clipped,gap,long_swing,\
-weak_stance,repaired,x_m,y_m,z_m,heading_rad";
+weak_stance,repaired,accel_clipped_samples,gyro_clipped_samples,x_m,y_m,z_m,heading_rad";
 
 /// What the ground did, in a word.
 pub fn mode_name(mode: FloorMode) -> &'static str {
@@ -45,6 +45,7 @@ pub fn table(track: &Track) -> String {
             quality.repaired,
         ];
         cells.extend(flags.map(|flag| u8::from(flag).to_string()));
+        cells.extend([step.clipped.accel, step.clipped.gyro].map(|count| count.to_string()));
         cells.extend(stance.position.map(|value| format!("{value:.6}")));
         // Writing to a string cannot fail.
         let _ = writeln!(rows, "{},{:.6}", cells.join(","), stance.heading);
@@ -74,6 +75,7 @@ mod tests {
         assert_eq!(rows.len(), 51);
         assert_eq!(&rows[3][2], "3.750000");
         assert_eq!(&rows[3][20], "1", "the gyroscope was clipped");
+        assert_eq!(&rows[3][26], "7", "so often");
         assert_eq!(&rows[50][18], "stairs");
     }
 
@@ -86,7 +88,7 @@ mod tests {
         for row in reader.records().map(|row| row.unwrap()).take(6) {
             x += cell(&row, 3);
             // The table has micrometres.
-            assert!((cell(&row, 25) - x).abs() < 1e-5);
+            assert!((cell(&row, 27) - x).abs() < 1e-5);
         }
     }
 

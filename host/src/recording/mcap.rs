@@ -415,6 +415,7 @@ mod tests {
     use nalgebra::{Matrix4, Vector3};
     use proptest::prelude::*;
     use proptest::sample::Index;
+    use sohle_shared::sample::ClippedSamples;
     use sohle_shared::step::{FloorMode, StepQuality};
     use sohle_shared::time::Micros;
 
@@ -444,6 +445,7 @@ mod tests {
             covariance: Matrix4::from_fn(|row, column| (row * 4 + column) as f32 * 1e-4),
             mode: FloorMode::Stairs,
             quality: StepQuality { gap: true, repaired: true, ..StepQuality::default() },
+            clipped: ClippedSamples { accel: 513, gyro: 2 },
         }
     }
 

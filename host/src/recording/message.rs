@@ -6,7 +6,7 @@
 
 use super::truth::{TruthPose, TruthStance};
 use nalgebra::{Matrix4, Vector3};
-use sohle_shared::sample::{Accel, Clipped, Gyro, ImuSample};
+use sohle_shared::sample::{Accel, Clipped, ClippedSamples, Gyro, ImuSample};
 use sohle_shared::step::{FloorMode, Step, StepQuality};
 use sohle_shared::time::Micros;
 
@@ -99,6 +99,10 @@ impl Decoder<'_> {
             *value = self.bytes().map(f32::from_le_bytes)?;
         }
         Some(values)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        self.bytes().map(u16::from_le_bytes)
     }
 
     fn flag(&mut self) -> Option<bool> {
@@ -228,7 +232,7 @@ const MODES: [FloorMode; 3] = [FloorMode::Level, FloorMode::Stairs, FloorMode::E
 
 impl Message for Step {
     const TOPIC: &'static str = "/step";
-    const SCHEMA: &'static str = "sohle/msg/Step";
+    const SCHEMA: &'static str = "sohle/msg/StepWithCounts";
     const DEFINITION: &'static str = "\
 # The change from the end of the previous stance to the end of this one.
 int64 stance_start_us
@@ -241,6 +245,9 @@ float32[3] displacement
 float32 turn
 # of x, y, z, turn; row by row
 float32[16] covariance
+# samples of which an axis stood at the end of its range
+uint16 accel_clipped_samples
+uint16 gyro_clipped_samples
 uint8 LEVEL=0
 uint8 STAIRS=1
 uint8 ELEVATOR=2
@@ -264,6 +271,7 @@ bool repaired
         out.f32s(&self.displacement);
         out.f32s([&self.turn]);
         out.f32s(&self.covariance.transpose());
+        out.0.extend([self.clipped.accel, self.clipped.gyro].iter().flat_map(|count| count.to_le_bytes()));
         out.0.push(MODES.iter().position(|&mode| mode == self.mode).map_or(0, |number| number as u8));
         let StepQuality { accel_clipped, gyro_clipped, gap, long_swing, weak_stance, repaired } = self.quality;
         out.flags([accel_clipped, gyro_clipped, gap, long_swing, weak_stance, repaired]);
@@ -276,6 +284,7 @@ bool repaired
         let displacement = Vector3::from(from.f32s::<3>()?);
         let [turn] = from.f32s()?;
         let covariance = Matrix4::from_row_slice(&from.f32s::<16>()?);
+        let clipped = ClippedSamples { accel: from.u16()?, gyro: from.u16()? };
         let [mode] = from.bytes()?;
         Some(Self {
             index,
@@ -293,6 +302,7 @@ bool repaired
                 weak_stance: from.flag()?,
                 repaired: from.flag()?,
             },
+            clipped,
         })
     }
 }
@@ -310,6 +320,7 @@ mod tests {
                 match kind.split('[').next().unwrap() {
                     "int64" | "float64" => 8,
                     "uint32" | "float32" => 4,
+                    "uint16" => 2,
                     "uint8" | "bool" => 1,
                     other => panic!("{other} in {line}"),
                 }

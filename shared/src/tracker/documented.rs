@@ -6,7 +6,7 @@ use super::stride::{Event, StepBuilder};
 use super::{Counters, Detector, Output, State};
 use crate::filter::state::{self, POSITION};
 use crate::filter::unscented::{self, UnscentedFilter};
-use crate::sample::{AccelCorrected, GyroCorrected, ImuSample, STANDARD_GRAVITY_M_S2};
+use crate::sample::{AccelCorrected, ClippedSamples, GyroCorrected, ImuSample, STANDARD_GRAVITY_M_S2};
 use crate::so3;
 use crate::stance::{self, StanceDetector, Verdict};
 use crate::step::{FloorMode, Step};
@@ -168,8 +168,9 @@ impl Documented {
             counters.gaps += 1;
             self.steps.warn().gap = true;
         }
-        self.steps.warn().accel_clipped |= sample.clipped.accel;
-        self.steps.warn().gyro_clipped |= sample.clipped.gyro;
+        let mut clipped = ClippedSamples::default();
+        clipped.count(sample.clipped);
+        self.steps.count(clipped);
 
         let verdict = self.detector.any().push(sample.time, accel, gyro, self.gravity);
         self.filter.predict(gyro, accel, dt);

@@ -133,10 +133,8 @@ impl Own {
         let increment = around[1]?;
         let dt = increment.duration();
 
-        let quality = self.steps.warn();
-        quality.accel_clipped |= increment.accel_clipped > 0.0;
-        quality.gyro_clipped |= increment.gyro_clipped > 0.0;
-        quality.gap |= increment.gap;
+        self.steps.count(increment.clipped);
+        self.steps.warn().gap |= increment.gap;
 
         self.filter.predict(&increment);
         let statistic = if around.iter().flatten().any(|increment| increment.gap) {

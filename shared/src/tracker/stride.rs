@@ -1,6 +1,7 @@
 //! From stances to [`Step`]s: when a stance is complete, what it is worth, and what to warn of.
 
 use crate::filter::rebase::Change;
+use crate::sample::ClippedSamples;
 use crate::step::{FloorMode, Step, StepQuality};
 use crate::time::Micros;
 
@@ -41,6 +42,7 @@ pub struct StepBuilder {
     swung: bool,
     left_at: Option<Micros>,
     quality: StepQuality,
+    clipped: ClippedSamples,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -61,12 +63,20 @@ impl StepBuilder {
             swung: true,
             left_at: None,
             quality: StepQuality::default(),
+            clipped: ClippedSamples::default(),
         }
     }
 
     /// What happened since the last step that should be known.
     pub fn warn(&mut self) -> &mut StepQuality {
         &mut self.quality
+    }
+
+    /// Takes in how many samples were clipped.
+    pub fn count(&mut self, clipped: ClippedSamples) {
+        self.clipped.add(clipped);
+        self.quality.accel_clipped |= clipped.accel > 0;
+        self.quality.gyro_clipped |= clipped.gyro > 0;
     }
 
     /// Takes in a moment: whether the foot stands and since when, how still it is, and whether it certainly swings.
@@ -126,6 +136,7 @@ impl StepBuilder {
             covariance: if first { nalgebra::Matrix4::zeros() } else { change.covariance },
             mode,
             quality,
+            clipped: core::mem::take(&mut self.clipped),
         };
         self.index = self.index.wrapping_add(1);
         self.swung = false;
