@@ -7,7 +7,8 @@
 //!
 //! The data are types with units: [`time`], [`sample`] and [`step`]. Rotations are in [`so3`], the detectors that tell
 //! when the foot stands in [`stance`], the filters that follow it in [`filter`]. Everything comes together in
-//! [`tracker`]; [`selftest`] proves that a processor computes it as every other does.
+//! [`tracker`]; `wire` (a feature) carries what it finds to the laptop; [`selftest`] proves that a processor computes it
+//! as every other does.
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]
@@ -25,3 +26,5 @@ pub mod stance;
 pub mod step;
 pub mod time;
 pub mod tracker;
+#[cfg(feature = "wire")]
+pub mod wire;

@@ -16,6 +16,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// How samples are gathered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Length of an increment; of slower sensors, each sample is one. **Units:** s.
     pub period_s: f32,

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 /// Settings of [`RestDetector`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Length of a rest. **Units:** s.
     pub window_s: f32,

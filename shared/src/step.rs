@@ -13,6 +13,7 @@ use nalgebra::{Matrix4, Vector3};
 /// What the ground under the foot does; decides which pseudo-measurements hold (Foot, 4.4.2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub enum FloorMode {
     /// On a level floor: its height is known (H4).
     #[default]

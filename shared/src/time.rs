@@ -8,6 +8,7 @@ use core::ops::{Add, Sub};
 /// A point in time. **Units:** microseconds since the recording's or the device's start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Micros(pub i64);
 
 impl Micros {

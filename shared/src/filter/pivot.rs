@@ -51,6 +51,7 @@ type Direction = SVector<f32, FREEDOMS>;
 /// Settings of [`PivotFilter`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Tilt at the start (standard deviation). **Units:** rad.
     pub tilt_sigma: f32,

@@ -35,6 +35,7 @@ const LARGEST_ROTATION: f32 = 3.0;
 /// Noise and trust. Variances, as the document states them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Variance of every component of the state at the start (4.59). **Units:** rad², m², (m/s)².
     pub start: f32,

@@ -24,6 +24,7 @@ use nalgebra::Vector3;
 /// Settings of [`Adaptive`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Noise of the accelerometer that weighs its part of the statistic. **Units:** m/s².
     pub accel_sigma: f32,

@@ -17,6 +17,7 @@ const GAP_US: i64 = 100_000;
 /// Settings of [`Documented`], names as in table 4.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// How long the foot must have been still. **Units:** s.
     pub min_still_time: f32,

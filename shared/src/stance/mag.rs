@@ -11,6 +11,7 @@ use crate::time::Micros;
 /// Settings of [`Mag`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Length of the window. **Units:** s.
     pub window_s: f32,

@@ -16,6 +16,7 @@ use nalgebra::Vector3;
 /// Settings of the document's way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Which detector tells the stances.
     pub detector: Detector,

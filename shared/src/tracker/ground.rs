@@ -10,6 +10,7 @@ use crate::step::FloorMode;
 /// Settings of [`Ground`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// A stride that rises or falls by less is level. **Units:** m.
     pub level_m: f32,

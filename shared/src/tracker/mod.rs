@@ -26,6 +26,7 @@ use own::Own;
 /// The way from samples to steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub enum Method {
     /// The project's own: increments, adaptive detector, pivot filter.
     #[default]
@@ -37,6 +38,7 @@ pub enum Method {
 /// The detector of [`Method::Unscented`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub enum Detector {
     /// The document's (Foot, 4.5).
     #[default]
@@ -56,6 +58,7 @@ pub enum Detector {
 /// All settings of a tracker. Those of the method that is not chosen have no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// The way from samples to steps.
     pub method: Method,
@@ -104,6 +107,8 @@ pub use documented::Parameters as DocumentParameters;
 
 /// What the tracker is doing (Foot, 4.4.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub enum State {
     /// Nothing seen yet.
     Reset,
@@ -130,6 +135,7 @@ pub struct Output {
 /// What went wrong or was unusual since the reset. Nothing of it stops the tracker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Counters {
     /// Samples taken in.
     pub samples: u64,

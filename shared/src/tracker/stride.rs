@@ -8,6 +8,7 @@ use crate::time::Micros;
 /// Settings of [`StepBuilder`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Parameters {
     /// Someone who stands for longer is told of at once; the stance goes on. **Units:** s.
     pub report_after_s: f32,

@@ -1,0 +1,248 @@
+//! The bytes of every message as a text that is committed: a change of the wire shows in a diff.
+
+use super::frame::{FRAME_MAX, FrameCounters, encode};
+use super::message::*;
+use super::packed::PackedStep;
+use super::transfer;
+use super::{PROTOCOL, SCHEMA};
+use crate::sample::ClippedSamples;
+use crate::step::{FloorMode, Step, StepQuality};
+use crate::time::Micros;
+use crate::tracker::{Counters, Parameters, State};
+use nalgebra::{Matrix4, Vector3};
+use serde::Serialize;
+use std::fmt::{Debug, Write};
+use std::string::{String, ToString};
+use std::vec::Vec;
+
+pub(super) fn step() -> Step {
+    Step {
+        index: 1_204,
+        stance_start: Micros(3_600_000_000),
+        stance_end: Micros(3_600_430_500),
+        displacement: Vector3::new(1.345, -0.02, 0.17),
+        turn: -0.3,
+        covariance: Matrix4::new(
+            4e-5, 1e-6, 0.0, 0.0, 1e-6, 9e-5, 0.0, 2e-5, 0.0, 0.0, 1e-5, 0.0, 0.0, 2e-5, 0.0, 1e-5,
+        ),
+        mode: FloorMode::Stairs,
+        quality: StepQuality { gyro_clipped: true, weak_stance: true, ..StepQuality::default() },
+        clipped: ClippedSamples { accel: 0, gyro: 17 },
+    }
+}
+
+fn hello() -> Hello {
+    let (firmware, board) = (text("0.1.0"), text("stm32wb55"));
+    Hello { protocol: PROTOCOL, schema: SCHEMA, boot: 0x1234_5678, accepted: true, firmware, board }
+}
+
+fn laptop_hello() -> LaptopHello {
+    LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session: 0x9abc_def0, software: text("0.1.0") }
+}
+
+fn sent() -> SentStep {
+    SentStep { boot: 0x1234_5678, id: 1_300, oldest: 1_299, step: PackedStep::pack(&step()) }
+}
+
+fn raw(frame: [i16; 3]) -> Raw {
+    let frames = [frame; RAW_FRAMES].into_iter().collect();
+    Raw { die: Die::Gyro, sequence: 640_000, stamp: Micros(320_000_250), lost: true, frames }
+}
+
+fn attitude() -> Attitude {
+    Attitude {
+        time: Micros(3_600_430_500),
+        state: State::Tracking,
+        stance: true,
+        attitude: [0.6, 0.0, -0.8, 0.0],
+        displacement: [0.25, 0.5, -1.0],
+        velocity: [2.0, 0.0, 0.125],
+        statistic: 3e4,
+    }
+}
+
+fn status() -> Status {
+    Status {
+        time: Micros(60_000_000),
+        state: State::Init,
+        load: 315,
+        lateness_us: 12_000,
+        temperature: Some(31.5),
+        battery: None,
+        stack: 9_872,
+        reset: ResetReason::Watchdog,
+        waiting: 3,
+        accel: DieCounters { frames: 120_000, overruns: 1, bus_errors: 2, readback_errors: 3, restarts: 4 },
+        gyro: DieCounters { frames: 119_980, ..DieCounters::default() },
+        tracker: Counters { samples: 119_980, gaps: 1, gyro_clipped: 61, ..Counters::default() },
+        link: LinkCounters {
+            frames: FrameCounters { good: 70, stuffing: 1, checksum: 2, too_long: 3, unknown: 4 },
+            steps_resent: 5,
+            steps_dropped: 0,
+            messages_dropped: 6,
+        },
+    }
+}
+
+fn log() -> Log {
+    Log { time: Micros(1_500), level: Level::Warn, text: text("gyroscope: FIFO overrun") }
+}
+
+fn reply(outcome: Outcome) -> FromShoe {
+    FromShoe::Reply(Reply { session: 0x9abc_def0, number: 7, outcome })
+}
+
+fn command(action: Action) -> ToShoe {
+    ToShoe::Command(Command { session: 0x9abc_def0, number: 7, action })
+}
+
+fn piece() -> transfer::Chunk {
+    transfer::chunk(&Parameters::default(), 0).unwrap()
+}
+
+/// One message of every kind.
+fn from_shoe() -> Vec<FromShoe> {
+    std::vec![
+        FromShoe::Hello(hello()),
+        FromShoe::Step(sent()),
+        reply(Outcome::Done),
+        reply(Outcome::Refused(Refusal::Piece(128))),
+        reply(Outcome::Parameters(piece())),
+        FromShoe::TimeReply(TimeReply { number: 9, received: Micros(1_000_000), sent: Micros(1_000_400) }),
+        FromShoe::Raw(raw([0, -12, 2_040])),
+        FromShoe::Attitude(attitude()),
+        FromShoe::Status(status()),
+        FromShoe::Log(log()),
+    ]
+}
+
+/// One message of every kind.
+fn to_shoe() -> Vec<ToShoe> {
+    std::vec![
+        ToShoe::Hello(laptop_hello()),
+        ToShoe::Ack(Ack { boot: 0x1234_5678, next: 1_300, later: 0b101 }),
+        ToShoe::TimeRequest(9),
+        command(Action::Reset),
+        command(Action::Init),
+        command(Action::Track),
+        command(Action::FloorMode(None)),
+        command(Action::FloorMode(Some(FloorMode::Elevator))),
+        command(Action::Raw(true)),
+        command(Action::WriteParameters(piece())),
+        command(Action::ReadParameters(256)),
+        command(Action::Calibrate(Calibration::Pose(5))),
+        command(Action::Resend),
+    ]
+}
+
+fn length<M: Serialize>(message: &M) -> usize {
+    encode(message, &mut [0; FRAME_MAX]).unwrap().len()
+}
+
+#[test]
+fn the_bytes_of_every_message_are_as_they_were() {
+    fn write<M: Serialize + Debug>(text: &mut String, message: &M) {
+        let mut buffer = [0; FRAME_MAX];
+        let frame = encode(message, &mut buffer).unwrap();
+        let name: String = std::format!("{message:?}").chars().take(60).collect();
+        writeln!(text, "{name}: {} bytes", frame.len()).unwrap();
+        for line in frame.chunks(48) {
+            let hex: Vec<_> = line.iter().map(|byte| std::format!("{byte:02x}")).collect();
+            writeln!(text, "    {}", hex.concat()).unwrap();
+        }
+    }
+    let mut text = String::new();
+    from_shoe().iter().for_each(|message| write(&mut text, message));
+    to_shoe().iter().for_each(|message| write(&mut text, message));
+    insta::assert_snapshot!(text.to_string());
+}
+
+#[test]
+fn the_longest_messages_fit_their_buffers() {
+    let longest = |n| core::iter::repeat_n('x', n).collect::<String>();
+    let far = Micros(i64::MIN);
+    let counters = |n| DieCounters { frames: n, overruns: n, bus_errors: n, readback_errors: n, restarts: n };
+    let messages = [
+        FromShoe::Hello(Hello {
+            protocol: u16::MAX,
+            schema: u64::MAX,
+            boot: u32::MAX,
+            accepted: true,
+            firmware: text(&longest(99)),
+            board: text(&longest(99)),
+        }),
+        FromShoe::Step(SentStep { boot: u32::MAX, id: u32::MAX, oldest: u32::MAX, ..sent() }),
+        reply(Outcome::Parameters(transfer::Chunk {
+            total: u16::MAX,
+            checksum: u32::MAX,
+            offset: u16::MAX,
+            bytes: heapless::Vec::from_slice(&[0xff; transfer::CHUNK_MAX]).unwrap(),
+        })),
+        FromShoe::Raw(Raw { sequence: u32::MAX, stamp: far, ..raw([i16::MIN; 3]) }),
+        FromShoe::Attitude(Attitude { time: far, ..attitude() }),
+        FromShoe::Status(Status {
+            time: far,
+            load: u16::MAX,
+            lateness_us: u32::MAX,
+            battery: Some(4.2),
+            stack: u32::MAX,
+            waiting: u16::MAX,
+            accel: counters(u32::MAX),
+            gyro: counters(u32::MAX),
+            tracker: Counters {
+                samples: u64::MAX,
+                not_finite: u32::MAX,
+                repeated: u32::MAX,
+                backwards: u32::MAX,
+                gaps: u32::MAX,
+                accel_clipped: u32::MAX,
+                gyro_clipped: u32::MAX,
+                repaired: u32::MAX,
+                restarts: u32::MAX,
+            },
+            link: LinkCounters {
+                frames: FrameCounters {
+                    good: u32::MAX,
+                    stuffing: u32::MAX,
+                    checksum: u32::MAX,
+                    too_long: u32::MAX,
+                    unknown: u32::MAX,
+                },
+                steps_resent: u32::MAX,
+                steps_dropped: u32::MAX,
+                messages_dropped: u32::MAX,
+            },
+            ..status()
+        }),
+        FromShoe::Log(Log { time: far, text: text(&longest(999)), ..log() }),
+    ];
+    for message in &messages {
+        let mut buffer = [0; FRAME_MAX];
+        let mut frame = encode(message, &mut buffer).unwrap();
+        assert_eq!(super::frame::AnyDecoder::new().next(&mut frame), Some(Ok(message.clone())));
+    }
+    let mut buffer = [0; FRAME_MAX];
+    let longest = command(Action::WriteParameters(transfer::Chunk {
+        total: u16::MAX,
+        checksum: u32::MAX,
+        offset: u16::MAX,
+        bytes: heapless::Vec::from_slice(&[0xff; transfer::CHUNK_MAX]).unwrap(),
+    }));
+    let mut frame = encode(&longest, &mut buffer).unwrap();
+    assert_eq!(super::link::ToShoeDecoder::new().next(&mut frame), Some(Ok(longest)));
+}
+
+#[test]
+fn everything_at_once_fits_the_line() {
+    // Both dies at 2 kHz with the largest counts, 20 attitudes, a status, a time reply and 10 lines of the log in a
+    // second, while old steps are sent as fast as they may be.
+    let raw = 2.0 * 2_000.0 / RAW_FRAMES as f64 * length(&FromShoe::Raw(raw([i16::MIN; 3]))) as f64;
+    let steps = 200.0 * length(&FromShoe::Step(sent())) as f64;
+    let rest = 20.0 * length(&FromShoe::Attitude(attitude())) as f64 + 1_500.0;
+    // A byte is ten bits: a start and a stop bit.
+    let load = (raw + steps + rest) * 10.0 / 921_600.0;
+    assert!((0.4..0.7).contains(&load), "{load}");
+    // Walking, without raw counts: a step in a second.
+    let walking = (rest + length(&FromShoe::Step(sent())) as f64) * 10.0 / 115_200.0;
+    assert!(walking < 0.4, "{walking}: a slow line carries it too");
+}

@@ -1,0 +1,29 @@
+//! The wire between shoe and laptop: every message once, its bytes, and what makes sure that each step arrives.
+//!
+//! A [`message`] is a postcard value with a checksum in a [`frame`]. A finished step is packed into 40 bytes
+//! ([`packed`]), kept in the [`outbox`] of the shoe until the laptop has acknowledged it, and put in order by the laptop's
+//! [`inbox`]. [`link`] is the shoe's whole end of the wire; the laptop's is in the `sohle` crate. Parameters, the one
+//! thing too long for a message, go in pieces ([`transfer`]).
+//!
+//! Both ends compile this module, so there is no second definition of anything; [`SCHEMA`] tells two ends apart that were
+//! compiled from different ones.
+
+pub mod frame;
+#[cfg(test)]
+mod golden;
+pub mod inbox;
+pub mod link;
+pub mod message;
+pub mod outbox;
+pub mod packed;
+pub mod transfer;
+
+use crate::tracker::Parameters;
+use message::{FromShoe, ToShoe};
+use postcard_schema::key::hash::fnv1a64::hash_ty_path;
+
+/// Counts up when a message changes its meaning but not its fields, which [`SCHEMA`] would not show.
+pub const PROTOCOL: u16 = 1;
+
+/// Hash over the names and types of all fields of all messages and of the tracker's parameters.
+pub const SCHEMA: u64 = u64::from_le_bytes(hash_ty_path::<(FromShoe, ToShoe, Parameters)>("sohle/wire"));
