@@ -74,14 +74,14 @@ pub fn binary(name: &str) -> PathBuf {
     in_root(TARGET_FOLDER).join(TARGET).join("release").join(name)
 }
 
-/// Builds `sohle-shared` for the microcontroller: it must need neither std nor a heap, with serde and without.
+/// Builds `sohle-shared` for the microcontroller: it must need neither std nor a heap, with any of its features.
 pub fn build_shared() -> Result<(), Failure> {
     let route = Route::find()?;
-    for features in [&[][..], &["--features", "serde"]] {
+    for features in [&[][..], &["--features", "serde"], &["--features", "wire"]] {
         let mut command = route.build(crate::root());
         command.args(["--package", "sohle-shared"]).args(features);
         process::run(&mut command)?;
     }
-    println!("sohle-shared builds for {TARGET}, with and without serde");
+    println!("sohle-shared builds for {TARGET}, bare, with serde and with the wire");
     Ok(())
 }
