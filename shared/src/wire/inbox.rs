@@ -91,3 +91,136 @@ impl Inbox {
         Some(Ack { boot: self.boot, next, later: later.fold(0, |bits, bit| bits | 1 << bit) })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::golden;
+    use super::super::outbox::{Outbox, Pace};
+    use super::*;
+    use crate::step::Step;
+    use crate::time::Micros;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn sent(id: u32, oldest: u32) -> SentStep {
+        SentStep { boot: 1, id, oldest, step: PackedStep::pack(&Step { index: id, ..golden::step() }) }
+    }
+
+    /// Numbers of the steps, and gaps as `(first, count)`.
+    fn drain(inbox: &mut Inbox) -> Vec<Result<u32, (u32, u32)>> {
+        core::iter::from_fn(|| inbox.pop())
+            .map(|delivery| match delivery {
+                Delivery::Step { id, step } => {
+                    assert_eq!(step.unpack().index, id);
+                    Ok(id)
+                }
+                Delivery::Gap { first, count } => Err((first, count)),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn steps_wait_for_those_before_them() {
+        let mut inbox = Inbox::new(1);
+        assert_eq!(inbox.ack(), None);
+        assert!(inbox.push(&sent(2, 0)) && inbox.push(&sent(1, 0)) && !inbox.push(&sent(2, 0)));
+        assert_eq!(drain(&mut inbox), []);
+        assert_eq!(inbox.ack(), Some(Ack { boot: 1, next: 0, later: 0b11 }));
+        inbox.push(&sent(0, 0));
+        assert_eq!(drain(&mut inbox), [Ok(0), Ok(1), Ok(2)]);
+        assert_eq!(inbox.ack(), Some(Ack { boot: 1, next: 3, later: 0 }));
+        assert!(!inbox.push(&sent(1, 0)));
+        assert_eq!(drain(&mut inbox), []);
+    }
+
+    #[test]
+    fn who_comes_late_begins_with_what_is_there() {
+        let mut inbox = Inbox::new(1);
+        inbox.push(&sent(41, 40));
+        inbox.push(&sent(40, 40));
+        assert_eq!(drain(&mut inbox), [Ok(40), Ok(41)]);
+    }
+
+    #[test]
+    fn what_the_shoe_has_given_up_is_a_gap() {
+        let mut inbox = Inbox::new(1);
+        inbox.push(&sent(0, 0));
+        inbox.push(&sent(3, 0));
+        assert_eq!(drain(&mut inbox), [Ok(0)]);
+        inbox.push(&sent(6, 5));
+        assert_eq!(drain(&mut inbox), [Err((1, 2)), Ok(3), Err((4, 1))]);
+        inbox.push(&sent(5, 5));
+        assert_eq!(drain(&mut inbox), [Ok(5), Ok(6)]);
+        // Far ahead: first the gap, then the step when it comes again.
+        assert!(!inbox.push(&sent(1_000, 900)));
+        assert_eq!(drain(&mut inbox), [Err((7, 893))]);
+        assert!(inbox.push(&sent(900, 900)));
+        assert_eq!(drain(&mut inbox), [Ok(900)]);
+    }
+
+    #[test]
+    fn steps_of_another_boot_are_none_of_ours() {
+        let mut inbox = Inbox::new(1);
+        assert!(!inbox.push(&SentStep { boot: 2, ..sent(0, 0) }));
+        assert_eq!(drain(&mut inbox), []);
+    }
+
+    proptest! {
+        #[test]
+        fn every_step_comes_once_and_in_order_over_a_bad_line(
+            seed in proptest::collection::vec(any::<u8>(), 64..256),
+            loss in 0..160_u8,
+        ) {
+            let mut outbox = Outbox::<128>::new(1, Pace::default());
+            let mut inbox = Inbox::new(1);
+            let mut chance = seed.iter().cycle().enumerate().map(|(i, byte)| byte.wrapping_add((i * i) as u8));
+            let (mut now, mut got, mut late) = (Micros(0), Vec::new(), Vec::new());
+            for tick in 0..6_000_u32 {
+                now = now + 5_000;
+                if tick % 100 == 0 && tick < 3_000 {
+                    outbox.push(sent(tick / 100, 0).step);
+                }
+                if let Some(sent) = outbox.next(now) {
+                    match chance.next().unwrap() {
+                        lost if lost < loss => {}
+                        delayed if delayed % 3 == 0 => late.push(sent),
+                        _ => {
+                            inbox.push(&sent);
+                        }
+                    }
+                }
+                if tick % 7 == 0 && let Some(sent) = late.pop() {
+                    inbox.push(&sent);
+                    inbox.push(&sent);
+                }
+                got.extend(drain(&mut inbox));
+                if let Some(ack) = inbox.ack().filter(|_| chance.next().unwrap() >= loss) {
+                    outbox.hear(now);
+                    outbox.acknowledge(&ack, now);
+                }
+            }
+            prop_assert_eq!(got, (0..30).map(Ok).collect::<Vec<_>>());
+        }
+
+        #[test]
+        fn whatever_comes_the_numbers_are_without_hole_or_repetition(
+            steps in proptest::collection::vec((any::<u32>(), any::<u32>(), 0..3_u8), 1..100),
+        ) {
+            let mut inbox = Inbox::new(1);
+            let mut next = None;
+            for (id, oldest, far) in steps {
+                let (id, oldest) = if far == 0 { (id, oldest) } else { (id % 200, oldest % 200) };
+                inbox.push(&SentStep { id, oldest, ..sent(0, 0) });
+                while let Some(delivery) = inbox.pop() {
+                    let (first, count) = match delivery {
+                        Delivery::Step { id, .. } => (id, 1),
+                        Delivery::Gap { first, count } => (first, count),
+                    };
+                    prop_assert!(count > 0 && next.is_none_or(|next| next == first));
+                    next = first.checked_add(count).or(Some(u32::MAX));
+                }
+                inbox.ack();
+            }
+        }
+    }
+}

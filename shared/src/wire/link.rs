@@ -292,3 +292,202 @@ impl<const STEPS: usize> Link<STEPS> {
         self.outbox.deadline(now).map_or(self.hello_due, |due| due.min(self.hello_due))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::frame::AnyDecoder;
+    use super::super::golden;
+    use super::super::message::Ack;
+    use super::super::transfer::chunk;
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const SESSION: u32 = 77;
+
+    fn link() -> Link<16> {
+        let identity = Identity { boot: 3, firmware: "1.2.3", board: "bench" };
+        Link::new(identity, &Parameters::default(), Pace::default())
+    }
+
+    fn hear(link: &mut Link<16>, message: &ToShoe, now: Micros) {
+        link.receive(frame::encode(message, &mut [0; FRAME_MAX]).unwrap(), now);
+    }
+
+    fn say(link: &mut Link<16>, now: Micros) -> Vec<FromShoe> {
+        let mut said = Vec::new();
+        let mut buffer = [0; FRAME_MAX];
+        while let Some(mut frame) = link.transmit(now, &mut buffer) {
+            said.push(AnyDecoder::new().next(&mut frame).unwrap().unwrap());
+        }
+        said
+    }
+
+    fn hello(session: u32, schema: u64) -> ToShoe {
+        ToShoe::Hello(LaptopHello { protocol: PROTOCOL, schema, session, software: text("test") })
+    }
+
+    fn command(number: u32, action: Action) -> ToShoe {
+        ToShoe::Command(Command { session: SESSION, number, action })
+    }
+
+    fn connected() -> Link<16> {
+        let mut link = link();
+        hear(&mut link, &hello(SESSION, SCHEMA), Micros(0));
+        assert!(matches!(&say(&mut link, Micros(0))[..], [FromShoe::Hello(hello)] if hello.accepted));
+        link
+    }
+
+    fn replies(link: &mut Link<16>) -> Vec<(u32, Outcome)> {
+        let said = say(link, Micros(1));
+        said.into_iter()
+            .filter_map(|message| match message {
+                FromShoe::Reply(reply) => Some((reply.number, reply.outcome)),
+                _ => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn nothing_but_hellos_is_said_before_a_laptop_with_the_same_messages_is_there() {
+        let mut link = link();
+        link.push(&golden::step());
+        hear(&mut link, &ToShoe::TimeRequest(1), Micros(0));
+        let only_hello = |said: &[FromShoe]| matches!(said, [FromShoe::Hello(hello)] if !hello.accepted);
+        assert!(only_hello(&say(&mut link, Micros(0))));
+        assert_eq!(link.deadline(Micros(0)), Micros(HELLO_US));
+        assert!(say(&mut link, Micros(HELLO_US - 1)).is_empty());
+        assert!(only_hello(&say(&mut link, Micros(HELLO_US))));
+        hear(&mut link, &hello(SESSION, SCHEMA ^ 1), Micros(HELLO_US + 1));
+        assert!(only_hello(&say(&mut link, Micros(HELLO_US + 1))), "the answer names the other schema");
+        hear(&mut link, &hello(SESSION, SCHEMA), Micros(HELLO_US + 2));
+        let said = say(&mut link, Micros(HELLO_US + 2));
+        assert!(matches!(said[..], [FromShoe::Hello(_), FromShoe::TimeReply(_), FromShoe::Step(_)]));
+        // Another program replaces the one that was there.
+        hear(&mut link, &hello(SESSION, SCHEMA ^ 1), Micros(HELLO_US + 3));
+        assert!(!link.connected());
+    }
+
+    #[test]
+    fn the_time_is_told_at_both_ends() {
+        let mut link = connected();
+        hear(&mut link, &ToShoe::TimeRequest(9), Micros(1_000));
+        let expected = TimeReply { number: 9, received: Micros(1_000), sent: Micros(1_400) };
+        assert_eq!(say(&mut link, Micros(1_400)), [FromShoe::TimeReply(expected)]);
+    }
+
+    #[test]
+    fn a_command_is_carried_out_once_and_answered_each_time_it_comes() {
+        let mut link = connected();
+        let init = command(1, Action::Init);
+        hear(&mut link, &init, Micros(1));
+        assert_eq!(link.request(), Some(Request::Init));
+        // It is still being carried out when it comes again, and so is another one.
+        hear(&mut link, &init, Micros(1));
+        hear(&mut link, &command(2, Action::Reset), Micros(1));
+        assert_eq!((link.request(), replies(&mut link)), (None, Vec::new()));
+        link.answer(Err(Refusal::NotNow));
+        let reply = (1, Outcome::Refused(Refusal::NotNow));
+        assert_eq!(replies(&mut link), [reply.clone()]);
+        hear(&mut link, &init, Micros(1));
+        assert_eq!((link.request(), replies(&mut link)), (None, [reply].into()));
+        hear(&mut link, &command(2, Action::Reset), Micros(1));
+        assert_eq!(link.request(), Some(Request::Reset));
+        link.answer(Ok(()));
+        assert_eq!(replies(&mut link), [(2, Outcome::Done)]);
+        hear(&mut link, &init, Micros(1));
+        assert_eq!((link.request(), replies(&mut link)), (None, Vec::new()), "a late one");
+    }
+
+    #[test]
+    fn the_numbers_of_another_session_begin_anew() {
+        let mut link = connected();
+        hear(&mut link, &command(1, Action::Raw(true)), Micros(1));
+        assert!(link.raw());
+        hear(&mut link, &hello(SESSION + 1, SCHEMA), Micros(2));
+        assert!(!link.raw());
+        say(&mut link, Micros(2));
+        hear(&mut link, &command(2, Action::Raw(true)), Micros(3));
+        assert!(!link.raw() && replies(&mut link).is_empty(), "a command of the session before");
+        hear(&mut link, &ToShoe::Command(Command { session: SESSION + 1, number: 1, action: Action::Init }), Micros(4));
+        assert_eq!(link.request(), Some(Request::Init));
+    }
+
+    #[test]
+    fn parameters_are_written_and_read_back() {
+        let new = Parameters { start_after_s: 9.0, ..Parameters::default() };
+        let mut link = connected();
+        let (mut number, mut offset) = (0, 0);
+        loop {
+            let piece = chunk(&new, offset).unwrap();
+            offset += piece.bytes.len() as u16;
+            number += 1;
+            let total = piece.total;
+            hear(&mut link, &command(number, Action::WriteParameters(piece)), Micros(1));
+            if offset == total {
+                break;
+            }
+            assert_eq!(replies(&mut link), [(number, Outcome::Done)]);
+        }
+        hear(&mut link, &command(number + 1, Action::ReadParameters(0)), Micros(1));
+        assert_eq!(link.request(), Some(Request::Parameters(new)));
+        link.answer(Ok(()));
+        assert_eq!(replies(&mut link), [(number, Outcome::Done)]);
+        hear(&mut link, &command(number + 1, Action::ReadParameters(128)), Micros(1));
+        assert_eq!(replies(&mut link), [(number + 1, Outcome::Parameters(chunk(&new, 128).unwrap()))]);
+    }
+
+    #[test]
+    fn refused_parameters_leave_the_old_ones() {
+        let mut link = connected();
+        for offset in [0, 128, 256] {
+            let piece = chunk(&Parameters::documented(), offset).unwrap();
+            hear(&mut link, &command(1 + u32::from(offset), Action::WriteParameters(piece)), Micros(1));
+        }
+        assert!(matches!(link.request(), Some(Request::Parameters(_))));
+        link.answer(Err(Refusal::Parameters));
+        hear(&mut link, &command(999, Action::ReadParameters(0)), Micros(1));
+        let old = Outcome::Parameters(chunk(&Parameters::default(), 0).unwrap());
+        assert_eq!(replies(&mut link).last(), Some(&(999, old)));
+    }
+
+    #[test]
+    fn acknowledged_steps_are_forgotten_but_not_by_those_of_another_boot() {
+        let mut link = connected();
+        link.push(&golden::step());
+        assert!(matches!(say(&mut link, Micros(10))[..], [FromShoe::Step(_)]));
+        hear(&mut link, &ToShoe::Ack(Ack { boot: 2, next: 1, later: 0 }), Micros(20));
+        assert_eq!(link.waiting(), 1);
+        hear(&mut link, &ToShoe::Ack(Ack { boot: 3, next: 1, later: 0 }), Micros(20));
+        assert_eq!(link.waiting(), 0);
+        assert_eq!(link.deadline(Micros(20)), Micros(i64::MAX));
+    }
+
+    #[test]
+    fn a_thousand_steps_fit_the_memory() {
+        // 40 bytes for each, and 64 of 24 bytes under way.
+        assert!(size_of::<Link<1_024>>() < 46_000, "{}", size_of::<Link<1_024>>());
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_panic(
+            chunks in proptest::collection::vec((proptest::collection::vec(any::<u8>(), 0..80), 0..3_u8, any::<i64>()), 0..40),
+        ) {
+            let mut link = connected();
+            for (bytes, kind, now) in chunks {
+                match kind {
+                    0 => link.receive(&bytes, Micros(now)),
+                    1 => link.receive(frame::encode(&bytes[..], &mut [0; FRAME_MAX]).unwrap(), Micros(now)),
+                    _ => link.push(&golden::step()),
+                }
+                link.request();
+                link.answer(Ok(()));
+                link.deadline(Micros(now));
+                for _ in 0..4 {
+                    link.transmit(Micros(now), &mut [0; FRAME_MAX]);
+                }
+            }
+        }
+    }
+}

@@ -257,9 +257,163 @@ impl<const N: usize> Outbox<N> {
     fn first_due(&self, now: Micros) -> Option<(usize, Micros)> {
         let mut under_way = (0..self.count.min(WINDOW)).filter_map(|offset| {
             let flight = &self.flights[self.oldest.wrapping_add(offset as u32) as usize % WINDOW];
-            let due = if flight.times == 0 { Micros(i64::MIN) } else { flight.due };
+            let due = if flight.times == 0 { now } else { flight.due.max(now) };
             (!flight.arrived).then_some((offset, due))
         });
+        // Of several that are due, the oldest: others wait for it.
         if self.is_silent(now) { under_way.next() } else { under_way.min_by_key(|&(_, due)| due) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::golden;
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const BOOT: u32 = 5;
+
+    fn step(index: u32) -> PackedStep {
+        PackedStep::pack(&crate::step::Step { index, ..golden::step() })
+    }
+
+    fn filled<const N: usize>(count: u32) -> Outbox<N> {
+        let mut outbox = Outbox::new(BOOT, Pace::default());
+        outbox.hear(Micros(0));
+        (0..count).for_each(|index| outbox.push(step(index)));
+        outbox
+    }
+
+    /// What goes out until `end`: time in milliseconds and number. Asks only when told to.
+    fn sent<const N: usize>(outbox: &mut Outbox<N>, now: &mut Micros, end: Micros) -> Vec<(i64, u32)> {
+        let mut sent = Vec::new();
+        while let Some(due) = outbox.deadline(*now).filter(|&due| due < end) {
+            *now = due.max(*now);
+            sent.extend(outbox.next(*now).map(|sent| (now.0 / 1_000, sent.id)));
+        }
+        *now = end;
+        sent
+    }
+
+    fn ack(next: u32, later: u64) -> Ack {
+        Ack { boot: BOOT, next, later }
+    }
+
+    #[test]
+    fn steps_go_one_after_the_other_and_wait_for_their_acknowledgement() {
+        let mut outbox = filled::<8>(3);
+        let mut now = Micros(0);
+        assert_eq!(sent(&mut outbox, &mut now, Micros(100_000)), [(0, 0), (5, 1), (10, 2)]);
+        outbox.acknowledge(&ack(3, 0), now);
+        assert!(outbox.is_empty());
+        assert_eq!(outbox.deadline(now), None);
+        assert_eq!((outbox.resent(), outbox.dropped()), (0, 0));
+    }
+
+    #[test]
+    fn only_the_missing_step_is_sent_again_and_at_once() {
+        let mut outbox = filled::<8>(4);
+        let mut now = Micros(0);
+        sent(&mut outbox, &mut now, Micros(30_000));
+        // 0, 2 and 3 have come.
+        outbox.acknowledge(&ack(1, 0b11), now);
+        assert_eq!(sent(&mut outbox, &mut now, Micros(60_000)), [(30, 1)]);
+        outbox.acknowledge(&ack(4, 0), now);
+        assert!(outbox.is_empty());
+    }
+
+    #[test]
+    fn unanswered_steps_wait_twice_as_long_each_time() {
+        let mut outbox = filled::<8>(1);
+        let mut now = Micros(0);
+        assert_eq!(
+            sent(&mut outbox, &mut now, Micros(2_900_000)),
+            [(0, 0), (250, 0), (750, 0), (1_750, 0), (2_750, 0)]
+        );
+        assert_eq!(outbox.resent(), 4);
+    }
+
+    #[test]
+    fn in_silence_only_the_oldest_is_tried_ever_more_rarely() {
+        let mut outbox = filled::<2_000>(1_000);
+        let mut now = Micros(10_000_000);
+        let tries = sent(&mut outbox, &mut now, Micros(610_000_000));
+        assert!(tries.iter().all(|&(_, id)| id == 0));
+        // 0.25, 0.5, 1, 2, 4, then every 8 s.
+        assert_eq!(tries.len(), 5 + 75);
+        assert!(tries.windows(2).all(|pair| pair[1].0 - pair[0].0 <= 8_000));
+    }
+
+    #[test]
+    fn after_the_silence_everything_follows_at_the_pace() {
+        let mut outbox = filled::<2_000>(1_000);
+        let mut now = Micros(600_000_000);
+        outbox.next(now);
+        outbox.hear(now);
+        let mut last = now;
+        let mut arrived = 0;
+        while !outbox.is_empty() {
+            now = outbox.deadline(now).unwrap().max(now);
+            let sent = outbox.next(now).unwrap();
+            assert!(now == last || now - last >= 5_000);
+            last = now;
+            assert_eq!(sent.id, arrived);
+            arrived += 1;
+            outbox.acknowledge(&ack(arrived, 0), now + 1_000);
+        }
+        assert_eq!(arrived, 1_000);
+        assert!((now.0 - 600_000_000) < 6_000_000, "1000 steps at 200 in a second");
+    }
+
+    #[test]
+    fn a_full_outbox_gives_up_the_oldest_and_tells() {
+        let mut outbox = filled::<4>(7);
+        assert_eq!((outbox.len(), outbox.dropped()), (4, 3));
+        let sent = outbox.next(Micros(0)).unwrap();
+        assert_eq!((sent.oldest, sent.id, sent.step.unpack().index), (3, 3, 3));
+    }
+
+    #[test]
+    fn acknowledgements_of_what_was_never_kept_change_nothing() {
+        let mut outbox = filled::<8>(2);
+        let mut now = Micros(0);
+        sent(&mut outbox, &mut now, Micros(20_000));
+        for next in [3, 1_000, u32::MAX / 2] {
+            outbox.acknowledge(&ack(next, u64::MAX), now);
+            assert_eq!(outbox.len(), 2);
+        }
+        outbox.acknowledge(&ack(1, 0), now);
+        outbox.acknowledge(&ack(0, 0), now);
+        assert_eq!(outbox.len(), 1);
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_acknowledged_only_the_oldest_go(
+            operations in proptest::collection::vec((0..4_u8, any::<u32>(), any::<u64>(), 0..10_000_000_i64), 1..200),
+        ) {
+            let mut outbox = filled::<16>(0);
+            let (mut now, mut pushed) = (Micros(0), 0);
+            for (kind, next, later, passed) in operations {
+                now = now + passed;
+                match kind {
+                    0 => {
+                        outbox.push(step(pushed));
+                        pushed += 1;
+                    }
+                    1 => outbox.hear(now),
+                    2 => outbox.acknowledge(&ack(if next % 4 == 0 { next } else { next % 64 }, later), now),
+                    _ => {
+                        if let Some(sent) = outbox.next(now) {
+                            prop_assert!(sent.id < pushed && sent.oldest <= sent.id);
+                            prop_assert_eq!(sent.step.unpack().index, sent.id);
+                            prop_assert_eq!(sent.oldest + outbox.len() as u32, pushed);
+                        }
+                    }
+                }
+                prop_assert!(outbox.len() <= 16 && outbox.dropped() <= pushed);
+            }
+        }
     }
 }
