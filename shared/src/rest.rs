@@ -49,6 +49,10 @@ pub struct Rest {
     pub accel: Vector3<f32>,
     /// How well the mean rate shows the bias (standard deviation). **Units:** rad/s.
     pub bias_sigma: f32,
+    /// How much the rate varied from increment to increment (standard deviation of the vector). **Units:** rad/s.
+    pub gyro_sigma: f32,
+    /// How much the force varied, likewise. **Units:** m/s².
+    pub accel_sigma: f32,
 }
 
 /// Room for a rest of 0.64 s at increments of 10 ms.
@@ -87,7 +91,8 @@ impl RestDetector {
             return None;
         }
         self.window.clear();
-        Some(Rest { gyro, accel: Vector3::new(ax, ay, az), bias_sigma: p.bias_sigma + p.bias_share * gyro_sigma })
+        let bias_sigma = p.bias_sigma + p.bias_share * gyro_sigma;
+        Some(Rest { gyro, accel: Vector3::new(ax, ay, az), bias_sigma, gyro_sigma, accel_sigma })
     }
 
     /// Forgets everything seen.
