@@ -5,7 +5,7 @@
 //! [`Guide`] finds it: the sensor is laid down in twelve attitudes for some seconds each, in any order, and the guide says
 //! what comes next, takes or refuses each rest with a reason, and tells at the end whether the sensor is good enough. It is
 //! fed with samples and knows nothing of where they come from, so the same guide runs on the shoe and on a recording.
-//! [`store`] keeps the result in flash.
+//! With the feature `store`, module `store` keeps the result in flash.
 //!
 //! A corrected sample is still an [`ImuSample`]: one of a better sensor. What is left of its errors is what the tracker
 //! estimates and takes out itself, and only that makes `AccelCorrected` and `GyroCorrected` of it. So there is no third
@@ -15,6 +15,8 @@ pub mod ellipsoid;
 mod guide;
 mod noise;
 mod pose;
+#[cfg(feature = "store")]
+pub mod store;
 mod temperature;
 pub mod verdict;
 
