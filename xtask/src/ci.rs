@@ -21,14 +21,17 @@ pub fn run(arguments: &Arguments) -> bool {
     }
     run.check("format", format);
     run.check("committed files", check::run);
-    run.check("lint", || process::run(&mut cargo("clippy --locked --workspace --all-targets -- -D warnings")));
+    run.check("lint", || {
+        process::run(&mut cargo("clippy --locked --workspace --all-features --all-targets -- -D warnings"))
+    });
     run.check("documentation", || {
         process::run(
-            cargo("doc --locked --workspace --no-deps --document-private-items").env("RUSTDOCFLAGS", "-D warnings"),
+            cargo("doc --locked --workspace --all-features --no-deps --document-private-items")
+                .env("RUSTDOCFLAGS", "-D warnings"),
         )
     });
     run.stage("tests", tests);
-    run.stage("documentation tests", || counted(cargo("test --locked --workspace --doc")));
+    run.stage("documentation tests", || counted(cargo("test --locked --workspace --all-features --doc")));
     run.check("no_std build", device::build_shared);
     run.check("bits on a Cortex-M4F", emulator::run);
     run.check("cost", bench::run);
@@ -53,9 +56,9 @@ fn format() -> Result<(), Failure> {
 fn tests() -> (Tally, Result<(), Failure>) {
     let nextest = process::read(&mut cargo("nextest --version")).is_ok();
     let words = if nextest {
-        "nextest run --locked --workspace --no-fail-fast"
+        "nextest run --locked --workspace --all-features --no-fail-fast"
     } else {
-        "test --locked --workspace --all-targets --no-fail-fast"
+        "test --locked --workspace --all-features --all-targets --no-fail-fast"
     };
     counted(cargo(words))
 }

@@ -77,11 +77,11 @@ pub fn binary(name: &str) -> PathBuf {
 /// Builds `sohle-shared` for the microcontroller: it must need neither std nor a heap, with any of its features.
 pub fn build_shared() -> Result<(), Failure> {
     let route = Route::find()?;
-    for features in [&[][..], &["--features", "serde"], &["--features", "wire"]] {
+    for features in [&[][..], &["--features", "serde"], &["--features", "wire,store"]] {
         let mut command = route.build(crate::root());
         command.args(["--package", "sohle-shared"]).args(features);
         process::run(&mut command)?;
     }
-    println!("sohle-shared builds for {TARGET}, bare, with serde and with the wire");
+    println!("sohle-shared builds for {TARGET}, bare, with serde, and with wire and store");
     Ok(())
 }
