@@ -166,7 +166,7 @@ impl GyroBiasTable {
         let Some(temperature) = temperature.filter(|value| value.is_finite()) else {
             return Some(Vector3::from(best.bias));
         };
-        let colder = self.points().filter(|point| point.temperature <= temperature).next_back();
+        let colder = self.points().rfind(|point| point.temperature <= temperature);
         let warmer = self.points().find(|point| point.temperature > temperature);
         Some(match (colder, warmer) {
             (Some(cold), Some(warm)) => {

@@ -388,7 +388,7 @@ mod tests {
         assert_eq!((link.request(), replies(&mut link)), (None, Vec::new()));
         link.answer(Err(Refusal::NotNow));
         let reply = (1, Outcome::Refused(Refusal::NotNow));
-        assert_eq!(replies(&mut link), [reply.clone()]);
+        assert_eq!(replies(&mut link), std::slice::from_ref(&reply));
         hear(&mut link, &init, Micros(1));
         assert_eq!((link.request(), replies(&mut link)), (None, [reply].into()));
         hear(&mut link, &command(2, Action::Reset), Micros(1));
