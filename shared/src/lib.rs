@@ -17,6 +17,8 @@
 extern crate std;
 
 pub mod calibration;
+#[cfg(any(feature = "wire", feature = "store"))]
+mod checksum;
 pub mod filter;
 pub mod preintegration;
 pub mod rest;

@@ -5,9 +5,9 @@
 //! and never while it holds the newest record, so whatever a loss of power leaves behind (a word half written, a page half
 //! erased) is beside the newest record, and has a wrong CRC or an older number.
 //!
-//! A map that migrates single values between pages (crate `sequential-storage` 8.0) was tried with the same flash in memory
-//! and lost or locked values in 34 of 12 628 cuts: a page that was half erased can still carry its marks, and is then
-//! taken for one of data. Whole records cost a kilobyte of buffer and need no marks.
+//! A map that migrates single values between pages (crate `sequential-storage` 8.0) was tried on the same flash in memory and
+//! lost or locked values at some of the cuts, probably because a page that was half erased can still carry its marks, and is
+//! then taken for one of data. Whole records cost a kilobyte of buffer and need no marks.
 //!
 //! Flash with error correction (STM32WB) answers the read of a half-written word with a non-maskable interrupt: the board's
 //! handler has to clear the flag and return.
@@ -16,9 +16,9 @@
 pub(crate) mod flash;
 
 use super::Calibration;
+use crate::checksum::CRC32;
 use crate::tracker::Parameters;
 use core::ops::Range;
-use crc::{CRC_32_ISO_HDLC, Crc};
 use embedded_storage_async::nor_flash::NorFlash;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -96,9 +96,6 @@ const RECORD: usize = HEADER + PAYLOAD;
 const SLOT: u32 = 32;
 /// Key, layout, length.
 const ENTRY: usize = 5;
-
-/// CRC-32 as of Ethernet, by a small table.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Where the newest record is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,7 +177,7 @@ impl Record {
     }
 
     fn checksum(&self) -> u32 {
-        let mut digest = CRC.digest();
+        let mut digest = CRC32.digest();
         digest.update(&self.bytes[..12]);
         digest.update(&self.bytes[HEADER..self.length]);
         digest.finalize()
@@ -532,7 +529,7 @@ mod tests {
         let fields = text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
         let names: String = fields.filter(|word| word.ends_with(':')).collect();
         let mut bytes = [0; PAYLOAD];
-        (CRC.checksum(names.as_bytes()), postcard::to_slice(value, &mut bytes).unwrap().len())
+        (CRC32.checksum(names.as_bytes()), postcard::to_slice(value, &mut bytes).unwrap().len())
     }
 
     #[test]

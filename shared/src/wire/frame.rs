@@ -9,9 +9,9 @@
 //! (IEEE 802.3): a random frame passes once in 4e9, and any three bit errors in a frame of this length are found
 //! (Koopman, "32-bit cyclic redundancy codes for Internet applications", DSN 2002).
 
+use crate::checksum::CRC32;
 use cobs::{DecodeResult, DecoderState};
 use core::fmt;
-use crc::{CRC_32_ISO_HDLC, Crc};
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -24,13 +24,6 @@ pub const MESSAGE_MAX: usize = 320;
 
 /// No frame is longer: an overhead of one byte for each 254, a checksum and two zeros. **Units:** bytes.
 pub const FRAME_MAX: usize = cobs::max_encoding_length(MESSAGE_MAX + CRC_BYTES) + 2;
-
-const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-
-/// CRC-32/ISO-HDLC.
-pub fn checksum(bytes: &[u8]) -> u32 {
-    CHECKSUM.checksum(bytes)
-}
 
 /// The message does not fit the buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +42,7 @@ pub fn encode<'a, M: Serialize + ?Sized>(message: &M, buffer: &'a mut [u8]) -> R
     let (first, rest) = buffer.split_first_mut().ok_or(TooLong)?;
     *first = 0;
     let stuffed = Cobs::try_new(Slice::new(rest)).map_err(|_| TooLong)?;
-    let checked = CrcModifier::new(stuffed, CHECKSUM.digest());
+    let checked = CrcModifier::new(stuffed, CRC32.digest());
     let length = postcard::serialize_with_flavor(message, checked).map_err(|_| TooLong)?.len();
     buffer.get(..length + 1).ok_or(TooLong)
 }
@@ -166,7 +159,7 @@ impl<const N: usize> Decoder<N> {
     fn message<M: DeserializeOwned>(&self) -> Result<M, FrameError> {
         let frame = self.frame.get(..self.length).unwrap_or_default();
         let (message, sum) = frame.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Checksum)?;
-        if checksum(message) != u32::from_le_bytes(*sum) {
+        if CRC32.checksum(message) != u32::from_le_bytes(*sum) {
             return Err(FrameError::Checksum);
         }
         match postcard::take_from_bytes(message) {

@@ -3,8 +3,8 @@
 //! Each piece tells the length and the checksum of the whole. Pieces of different wholes never mix, nothing takes effect
 //! before the whole is there and its checksum is right, and a transfer that was cut is simply begun again.
 
-use super::frame::checksum;
 use super::message::Refusal;
+use crate::checksum::CRC32;
 use crate::tracker::Parameters;
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -38,7 +38,7 @@ pub fn chunk(parameters: &Parameters, offset: u16) -> Result<Chunk, Refusal> {
     Ok(Chunk {
         // No longer than PARAMETERS_MAX.
         total: whole.len() as u16,
-        checksum: checksum(whole),
+        checksum: CRC32.checksum(whole),
         offset,
         bytes: Vec::from_slice(piece).map_err(|_| Refusal::TooLong)?,
     })
@@ -89,7 +89,7 @@ impl Assembly {
         }
         self.filled = 0;
         let whole = self.bytes.get(..total).ok_or(Refusal::TooLong)?;
-        if checksum(whole) != chunk.checksum {
+        if CRC32.checksum(whole) != chunk.checksum {
             return Err(Refusal::Checksum);
         }
         match postcard::take_from_bytes(whole) {
@@ -165,7 +165,7 @@ mod tests {
         assert_eq!(results[last], Err(Refusal::Checksum));
         let whole = [9; 20];
         let foreign =
-            Chunk { total: 20, checksum: checksum(&whole), offset: 0, bytes: Vec::from_slice(&whole).unwrap() };
+            Chunk { total: 20, checksum: CRC32.checksum(&whole), offset: 0, bytes: Vec::from_slice(&whole).unwrap() };
         assert_eq!(assembly.push(&foreign), Err(Refusal::Parameters));
         assert_eq!(assembly.push(&Chunk { total: 513, ..foreign.clone() }), Err(Refusal::TooLong));
         assert_eq!(assembly.push(&Chunk { total: 19, ..foreign }), Err(Refusal::Piece(0)));
