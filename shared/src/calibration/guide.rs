@@ -330,6 +330,7 @@ fn report(fit: &Fit, verdict: &mut Verdict) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::DEG;
     use super::*;
     use crate::calibration::{Correction, Grade};
     use crate::sample::STANDARD_GRAVITY_M_S2;
@@ -337,7 +338,6 @@ mod tests {
     use std::vec::Vec;
 
     const G: f32 = STANDARD_GRAVITY_M_S2;
-    const DEG: f32 = core::f32::consts::PI / 180.0;
 
     /// Hands a sensor with some errors from pose to pose, 100 samples a second.
     struct Hand {

@@ -30,6 +30,9 @@ pub use verdict::{Finding, Grade, Property, Verdict};
 use crate::sample::{Accel, Gyro, ImuSample};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+/// Degrees to radians.
+const DEG: f32 = core::f32::consts::PI / 180.0;
+
 /// How well the accelerometer's correction is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]

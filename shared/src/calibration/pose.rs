@@ -4,6 +4,7 @@
 //! and scale, the edges the misalignment of the axes, and three of the twelve are left over to check the rest by. Order
 //! and exactness do not matter, and others do no harm: the fit uses only that each was at rest.
 
+use super::DEG;
 use super::ellipsoid::{Fit, FitError, fit};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -225,8 +226,6 @@ impl SixPose {
     }
 }
 
-/// Degrees to radians.
-const DEG: f32 = core::f32::consts::PI / 180.0;
 /// What a pose of some seconds shows of the gyroscope's bias. **Units:** rad/s.
 const GYRO_SIGMA: f32 = 0.01 * DEG;
 /// Prior of bias, its change with the temperature and what 1 g does on each axis: limits of the data sheet (BMI088,

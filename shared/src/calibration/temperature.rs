@@ -5,6 +5,7 @@
 //! each at the mean temperature of the rests it was made of. Between two points the bias is interpolated; beyond the
 //! outermost it goes on with the slope of the two outermost points, as far as the data sheet allows for such a slope.
 
+use super::DEG;
 use nalgebra::Vector3;
 
 /// Number of points: from -20 to +60 °C one every 10 K.
@@ -17,8 +18,6 @@ const STEEPEST: f32 = 0.015 * DEG;
 const BEST_SIGMA: f32 = 0.005 * DEG;
 /// Points this close say nothing of a slope. **Units:** K.
 const LEAST_SPAN_K: f32 = 4.0;
-/// Degrees to radians.
-const DEG: f32 = core::f32::consts::PI / 180.0;
 
 /// What was seen around one temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,7 @@
 //! BST-BMI088-DS000-19, table 5, the same die). What lies within is good; what lies a little outside is corrected by the
 //! calibration and acceptable; what lies far outside is another sensor, or a broken one.
 
+use super::DEG;
 use super::ellipsoid::FitError;
 
 /// How good something is; the worst is the last.
@@ -79,7 +80,6 @@ struct Manner {
     advice: &'static str,
 }
 
-const DEG: f32 = core::f32::consts::PI / 180.0;
 const MILLI_G: f32 = 1e-3 * crate::sample::STANDARD_GRAVITY_M_S2;
 
 impl Property {
