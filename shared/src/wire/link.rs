@@ -200,32 +200,30 @@ impl<const STEPS: usize> Link<STEPS> {
             Some(number) if number > command.number || peer.command.open() => return,
             _ => {}
         }
-        let outcome = match command.action {
-            Action::Reset => Err(Request::Reset),
-            Action::Init => Err(Request::Init),
-            Action::Track => Err(Request::Track),
-            Action::FloorMode(mode) => Err(Request::FloorMode(mode)),
-            Action::Calibrate(calibration) => Err(Request::Calibrate(calibration)),
+        let ask = |request| CommandState::Waiting(command.number, request);
+        let tell = |outcome| CommandState::Answered(command.number, outcome);
+        peer.command = match command.action {
+            Action::Reset => ask(Request::Reset),
+            Action::Init => ask(Request::Init),
+            Action::Track => ask(Request::Track),
+            Action::FloorMode(mode) => ask(Request::FloorMode(mode)),
+            Action::Calibrate(calibration) => ask(Request::Calibrate(calibration)),
             Action::WriteParameters(chunk) => match self.assembly.push(&chunk) {
-                Ok(Some(parameters)) => Err(Request::Parameters(parameters)),
-                Ok(None) => Ok(Outcome::Done),
-                Err(refusal) => Ok(Outcome::Refused(refusal)),
+                Ok(Some(parameters)) => ask(Request::Parameters(parameters)),
+                Ok(None) => tell(Outcome::Done),
+                Err(refusal) => tell(Outcome::Refused(refusal)),
             },
             Action::ReadParameters(offset) => {
-                Ok(transfer::chunk(&self.parameters, offset).map_or_else(Outcome::Refused, Outcome::Parameters))
+                tell(transfer::chunk(&self.parameters, offset).map_or_else(Outcome::Refused, Outcome::Parameters))
             }
             Action::Raw(on) => {
                 self.raw = on;
-                Ok(Outcome::Done)
+                tell(Outcome::Done)
             }
             Action::Resend => {
                 self.outbox.resend_all(now);
-                Ok(Outcome::Done)
+                tell(Outcome::Done)
             }
-        };
-        peer.command = match outcome {
-            Ok(outcome) => CommandState::Answered(command.number, outcome),
-            Err(request) => CommandState::Waiting(command.number, request),
         };
         peer.reply_due = !peer.command.open();
     }
