@@ -146,6 +146,13 @@ impl Documented {
         self.ground.command(mode);
     }
 
+    pub(super) fn initialise_anew(&mut self) {
+        self.phase = State::Init;
+        self.calibration = Calibration::new();
+        self.standing_since = None;
+        self.steps.warn().gap = true;
+    }
+
     pub(super) fn phase(&self) -> State {
         self.phase
     }

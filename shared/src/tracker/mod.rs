@@ -235,6 +235,24 @@ impl Tracker {
         }
     }
 
+    /// Back to INIT: attitude, velocity and biases are found anew at the next rest. The steps go on counting, the next one
+    /// carries the mark of a gap, and what a map commanded still holds.
+    pub fn initialise(&mut self) {
+        match &mut self.way {
+            Way::Own(own) => own.initialise(self.last),
+            Way::Documented(documented) => documented.initialise_anew(),
+        }
+    }
+
+    /// Starts from the next stance, without waiting for a rest. Whether it could: not in state TRACKING, and not with
+    /// [`Method::Unscented`], whose filter needs a rest.
+    pub fn start_moving(&mut self) -> bool {
+        match &mut self.way {
+            Way::Own(own) => own.start_moving(),
+            Way::Documented(_) => false,
+        }
+    }
+
     /// What the tracker is doing.
     pub fn state(&self) -> State {
         match &self.way {
@@ -391,6 +409,37 @@ mod tests {
         // What comes long after the hole is as good as without it.
         let [length, _, turn] = differences(&whole[whole.len() - 5..], &steps[steps.len() - 5..]);
         assert!(length < 0.02 && turn < 0.01, "{length} m, {turn} rad");
+    }
+
+    #[test]
+    fn told_to_wait_for_a_rest_it_finds_itself_anew_and_goes_on_counting() {
+        let samples = walk();
+        let mut tracker = Tracker::new(&Parameters::default());
+        let (first, second) = samples.split_at(samples.len() / 2);
+        let mut steps: Vec<_> = first.iter().filter_map(|sample| tracker.push(sample).step).collect();
+        tracker.initialise();
+        assert_eq!(tracker.state(), State::Init);
+        let before = steps.len() as u32;
+        steps.extend(second.iter().filter_map(|sample| tracker.push(sample).step));
+        steps.extend(tracker.finish());
+        assert!(steps.iter().zip(0..).all(|(step, index)| step.index == index));
+        assert!(steps.len() as u32 > before, "found itself again");
+        assert!(steps[before as usize].quality.gap && !steps[before as usize + 1].quality.gap);
+    }
+
+    #[test]
+    fn told_not_to_wait_it_starts_from_the_first_stance() {
+        let moving: Vec<_> = walk().into_iter().filter(|sample| sample.time.0 > 4_000_000).collect();
+        let started = |told: bool| {
+            let mut tracker = Tracker::new(&Parameters { start_after_s: 1e3, ..Parameters::default() });
+            assert!(!told || tracker.start_moving());
+            let at = moving.iter().position(|sample| tracker.push(sample).state == State::Tracking);
+            assert!(at.is_none() || !tracker.start_moving(), "it is tracking already");
+            at.map(|at| moving[at].time - moving[0].time)
+        };
+        // A stride of this walk takes a second.
+        assert!(started(true).is_some_and(|after| after < 1_500_000), "{:?}", started(true));
+        assert!(started(false).is_none_or(|after| after > 5_000_000), "{:?}", started(false));
     }
 
     #[test]

@@ -47,6 +47,8 @@ pub(super) struct Own {
     steps: StepBuilder,
     state: State,
     waiting_since: Option<Micros>,
+    /// Told not to wait for a rest.
+    impatient: bool,
     repaired: u32,
     stance: bool,
 }
@@ -65,6 +67,7 @@ impl Own {
             steps: StepBuilder::new(&p.steps),
             state: State::Reset,
             waiting_since: None,
+            impatient: false,
             repaired: 0,
             stance: false,
         }
@@ -72,6 +75,21 @@ impl Own {
 
     pub(super) fn command(&mut self, mode: Option<FloorMode>) {
         self.ground.command(mode);
+    }
+
+    pub(super) fn initialise(&mut self, now: Option<Micros>) {
+        self.state = State::Init;
+        self.stance = false;
+        self.waiting_since = now;
+        self.impatient = false;
+        self.rest.reset();
+        self.detector.reset();
+        self.steps.warn().gap = true;
+    }
+
+    pub(super) fn start_moving(&mut self) -> bool {
+        self.impatient = self.state != State::Tracking;
+        self.impatient
     }
 
     pub(super) fn push(&mut self, sample: &ImuSample, counters: &mut Counters) -> Output {
@@ -111,7 +129,8 @@ impl Own {
         }
         let statistic = self.statistic(&[Some(*increment)]);
         let verdict = self.detector.judge(increment.end, statistic, None);
-        let waited = self.waiting_since.is_some_and(|since| increment.end.since(since) > self.start_after_s);
+        let waiting_since = *self.waiting_since.get_or_insert(increment.end);
+        let waited = self.impatient || increment.end.since(waiting_since) > self.start_after_s;
         if waited && verdict.stance && verdict.velocity_sigma.is_some() {
             self.filter.start(&accel, None);
             self.track();
@@ -120,6 +139,7 @@ impl Own {
 
     fn track(&mut self) {
         self.state = State::Tracking;
+        self.impatient = false;
         self.ring = [None; 2];
         self.detector.reset();
         self.rest.reset();
@@ -175,12 +195,7 @@ impl Own {
 
         if !self.filter.is_finite() || self.filter.state().velocity.norm_squared() > LOST_SPEED * LOST_SPEED {
             counters.restarts += 1;
-            self.state = State::Init;
-            self.stance = false;
-            self.waiting_since = Some(increment.end);
-            self.rest.reset();
-            self.detector.reset();
-            self.steps.warn().gap = true;
+            self.initialise(Some(increment.end));
         }
         step
     }
