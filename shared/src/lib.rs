@@ -16,6 +16,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod bmx055;
 pub mod calibration;
 #[cfg(any(feature = "wire", feature = "store"))]
 mod checksum;

@@ -16,6 +16,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 /// What turns a reading into the specific force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Correction {
     /// Reading without any force. **Units:** m/s²; **Frame:** sensor.
     pub bias: [f32; 3],

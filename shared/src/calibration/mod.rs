@@ -36,6 +36,7 @@ const DEG: f32 = core::f32::consts::PI / 180.0;
 /// How well the accelerometer's correction is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Quality {
     /// Verdict of the guide.
     pub grade: Grade,
@@ -52,6 +53,7 @@ pub struct Quality {
 /// The constants of one unit. `Default` changes nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Calibration {
     /// When it was made, if whoever made it has a calendar. **Units:** s since 1970-01-01.
     pub made: Option<u64>,

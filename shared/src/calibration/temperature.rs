@@ -22,6 +22,7 @@ const LEAST_SPAN_K: f32 = 4.0;
 /// What was seen around one temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub struct Point {
     /// Mean temperature. **Units:** °C.
     pub temperature: f32,
@@ -103,6 +104,11 @@ impl<'de> serde::Deserialize<'de> for GyroBiasTable {
         }
         deserializer.deserialize_seq(List)
     }
+}
+
+#[cfg(feature = "wire")]
+impl postcard_schema::Schema for GyroBiasTable {
+    const SCHEMA: &'static postcard_schema::schema::NamedType = <[Point]>::SCHEMA;
 }
 
 impl GyroBiasTable {

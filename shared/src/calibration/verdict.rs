@@ -10,6 +10,7 @@ use super::ellipsoid::FitError;
 /// How good something is; the worst is the last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub enum Grade {
     /// As it should be.
     #[default]

@@ -3,12 +3,13 @@
 use super::frame::{FRAME_MAX, FrameCounters, encode};
 use super::message::*;
 use super::packed::PackedStep;
-use super::transfer;
+use super::transfer::{self, Item};
 use super::{PROTOCOL, SCHEMA};
+use crate::bmx055::{BATCH_FRAMES, Batch, Die, DieCounters};
 use crate::sample::ClippedSamples;
 use crate::step::{FloorMode, Step, StepQuality};
 use crate::time::Micros;
-use crate::tracker::{Counters, Parameters, State};
+use crate::tracker::{Counters, State};
 use nalgebra::{Matrix4, Vector3};
 use serde::Serialize;
 use std::fmt::{Debug, Write};
@@ -45,8 +46,10 @@ fn sent() -> SentStep {
 }
 
 fn raw(frame: [i16; 3]) -> Raw {
-    let frames = [frame; RAW_FRAMES].into_iter().collect();
-    Raw { die: Die::Gyro, sequence: 640_000, stamp: Micros(320_000_250), lost: true, frames }
+    let frames = [frame; BATCH_FRAMES].into_iter().collect();
+    let (sequence, stamp) = (640_000, Micros(320_000_250));
+    let batch = Batch { die: Die::Gyro, sequence, stamp, lost: true, temperature: Some(17), frames };
+    Raw { number: 70_000, item: RawItem::Batch(batch) }
 }
 
 fn attitude() -> Attitude {
@@ -57,7 +60,6 @@ fn attitude() -> Attitude {
         attitude: [0.6, 0.0, -0.8, 0.0],
         displacement: [0.25, 0.5, -1.0],
         velocity: [2.0, 0.0, 0.125],
-        statistic: 3e4,
     }
 }
 
@@ -72,7 +74,16 @@ fn status() -> Status {
         stack: 9_872,
         reset: ResetReason::Watchdog,
         waiting: 3,
-        accel: DieCounters { frames: 120_000, overruns: 1, bus_errors: 2, readback_errors: 3, restarts: 4 },
+        accel: DieCounters {
+            frames: 120_000,
+            overruns: 1,
+            invalid_frames: 2,
+            missed_interrupts: 3,
+            bus_errors: 4,
+            bad_ids: 5,
+            readback_errors: 6,
+            restarts: 7,
+        },
         gyro: DieCounters { frames: 119_980, ..DieCounters::default() },
         tracker: Counters { samples: 119_980, gaps: 1, gyro_clipped: 61, ..Counters::default() },
         link: LinkCounters {
@@ -97,7 +108,13 @@ fn command(action: Action) -> ToShoe {
 }
 
 fn piece() -> transfer::Chunk {
-    transfer::chunk(&Parameters::default(), 0).unwrap()
+    let bytes = core::array::from_fn::<u8, { transfer::CHUNK_MAX }, _>(|at| at as u8);
+    transfer::Chunk {
+        total: 300,
+        checksum: 0x89ab_cdef,
+        offset: 128,
+        bytes: heapless::Vec::from_slice(&bytes).unwrap(),
+    }
 }
 
 /// One message of every kind.
@@ -107,9 +124,11 @@ fn from_shoe() -> Vec<FromShoe> {
         FromShoe::Step(sent()),
         reply(Outcome::Done),
         reply(Outcome::Refused(Refusal::Piece(128))),
-        reply(Outcome::Parameters(piece())),
+        reply(Outcome::Piece(piece())),
         FromShoe::TimeReply(TimeReply { number: 9, received: Micros(1_000_000), sent: Micros(1_000_400) }),
+        FromShoe::Raw(Raw { number: 0, item: RawItem::Start }),
         FromShoe::Raw(raw([0, -12, 2_040])),
+        FromShoe::Raw(Raw { number: 1, item: RawItem::Order(Order::FloorMode(Some(FloorMode::Stairs))) }),
         FromShoe::Attitude(attitude()),
         FromShoe::Status(status()),
         FromShoe::Log(log()),
@@ -122,15 +141,14 @@ fn to_shoe() -> Vec<ToShoe> {
         ToShoe::Hello(laptop_hello()),
         ToShoe::Ack(Ack { boot: 0x1234_5678, next: 1_300, later: 0b101 }),
         ToShoe::TimeRequest(9),
-        command(Action::Reset),
-        command(Action::Init),
-        command(Action::Track),
-        command(Action::FloorMode(None)),
-        command(Action::FloorMode(Some(FloorMode::Elevator))),
+        command(Action::Order(Order::Reset)),
+        command(Action::Order(Order::Init)),
+        command(Action::Order(Order::Track)),
+        command(Action::Order(Order::FloorMode(None))),
+        command(Action::Order(Order::FloorMode(Some(FloorMode::Elevator)))),
         command(Action::Raw(true)),
-        command(Action::WriteParameters(piece())),
-        command(Action::ReadParameters(256)),
-        command(Action::Calibrate(Calibration::Pose(5))),
+        command(Action::Write(Item::Parameters, piece())),
+        command(Action::Read(Item::Calibration, 256)),
         command(Action::Resend),
     ]
 }
@@ -161,7 +179,21 @@ fn the_bytes_of_every_message_are_as_they_were() {
 fn the_longest_messages_fit_their_buffers() {
     let longest = |n| core::iter::repeat_n('x', n).collect::<String>();
     let far = Micros(i64::MIN);
-    let counters = |n| DieCounters { frames: n, overruns: n, bus_errors: n, readback_errors: n, restarts: n };
+    let counters = |n| DieCounters {
+        frames: n,
+        overruns: n,
+        invalid_frames: n,
+        missed_interrupts: n,
+        bus_errors: n,
+        bad_ids: n,
+        readback_errors: n,
+        restarts: n,
+    };
+    let mut farthest = raw([i16::MIN; 3]);
+    farthest.number = u32::MAX;
+    if let RawItem::Batch(batch) = &mut farthest.item {
+        (batch.sequence, batch.stamp) = (u32::MAX, far);
+    }
     let messages = [
         FromShoe::Hello(Hello {
             protocol: u16::MAX,
@@ -172,13 +204,13 @@ fn the_longest_messages_fit_their_buffers() {
             board: text(&longest(99)),
         }),
         FromShoe::Step(SentStep { boot: u32::MAX, id: u32::MAX, oldest: u32::MAX, ..sent() }),
-        reply(Outcome::Parameters(transfer::Chunk {
+        reply(Outcome::Piece(transfer::Chunk {
             total: u16::MAX,
             checksum: u32::MAX,
             offset: u16::MAX,
             bytes: heapless::Vec::from_slice(&[0xff; transfer::CHUNK_MAX]).unwrap(),
         })),
-        FromShoe::Raw(Raw { sequence: u32::MAX, stamp: far, ..raw([i16::MIN; 3]) }),
+        FromShoe::Raw(farthest),
         FromShoe::Attitude(Attitude { time: far, ..attitude() }),
         FromShoe::Status(Status {
             time: far,
@@ -222,12 +254,15 @@ fn the_longest_messages_fit_their_buffers() {
         assert_eq!(super::frame::AnyDecoder::new().next(&mut frame), Some(Ok(message.clone())));
     }
     let mut buffer = [0; FRAME_MAX];
-    let longest = command(Action::WriteParameters(transfer::Chunk {
-        total: u16::MAX,
-        checksum: u32::MAX,
-        offset: u16::MAX,
-        bytes: heapless::Vec::from_slice(&[0xff; transfer::CHUNK_MAX]).unwrap(),
-    }));
+    let longest = command(Action::Write(
+        Item::Calibration,
+        transfer::Chunk {
+            total: u16::MAX,
+            checksum: u32::MAX,
+            offset: u16::MAX,
+            bytes: heapless::Vec::from_slice(&[0xff; transfer::CHUNK_MAX]).unwrap(),
+        },
+    ));
     let mut frame = encode(&longest, &mut buffer).unwrap();
     assert_eq!(super::link::ToShoeDecoder::new().next(&mut frame), Some(Ok(longest)));
 }
@@ -236,7 +271,7 @@ fn the_longest_messages_fit_their_buffers() {
 fn everything_at_once_fits_the_line() {
     // Both dies at 2 kHz with the largest counts, 20 attitudes, a status, a time reply and 10 lines of the log in a
     // second, while old steps are sent as fast as they may be.
-    let raw = 2.0 * 2_000.0 / RAW_FRAMES as f64 * length(&FromShoe::Raw(raw([i16::MIN; 3]))) as f64;
+    let raw = 2.0 * 2_000.0 / BATCH_FRAMES as f64 * length(&FromShoe::Raw(raw([i16::MIN; 3]))) as f64;
     let steps = 200.0 * length(&FromShoe::Step(sent())) as f64;
     let rest = 20.0 * length(&FromShoe::Attitude(attitude())) as f64 + 1_500.0;
     // A byte is ten bits: a start and a stop bit.

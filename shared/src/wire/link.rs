@@ -6,14 +6,16 @@
 
 use super::frame::{self, Decoder, FRAME_MAX};
 use super::message::{
-    Action, Calibration, Command, FromShoe, Hello, LaptopHello, LinkCounters, Outcome, Refusal, Reply, TimeReply,
-    ToShoe, text,
+    Action, Command, FromShoe, Hello, LaptopHello, LinkCounters, Order, Outcome, Refusal, Reply, TimeReply, ToShoe,
+    text,
 };
 use super::outbox::{Outbox, Pace};
 use super::packed::PackedStep;
-use super::transfer::{self, Assembly};
+use super::transfer::{self, Assembly, Item, Value};
+
 use super::{PROTOCOL, SCHEMA};
-use crate::step::{FloorMode, Step};
+use crate::calibration::Calibration;
+use crate::step::Step;
 use crate::time::Micros;
 use crate::tracker::Parameters;
 
@@ -41,18 +43,12 @@ pub struct Identity {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is no heap on the shoe, and one request at a time")]
 pub enum Request {
-    /// Back to RESET.
-    Reset,
-    /// Wait for a rest and start from there.
-    Init,
-    /// Start from the next stance.
-    Track,
-    /// What the ground does.
-    FloorMode(Option<FloorMode>),
-    /// Put these parameters into effect.
-    Parameters(Parameters),
-    /// A step of a calibration.
-    Calibrate(Calibration),
+    /// Something for the tracker.
+    Order(Order),
+    /// Reset the tracker and send [`Raw`](super::message::Raw) messages from there on, or stop to send them.
+    Raw(bool),
+    /// Put this into effect, and keep it.
+    Write(Value),
 }
 
 /// The laptop that said hello.
@@ -95,6 +91,7 @@ impl CommandState {
 pub struct Link<const STEPS: usize> {
     identity: Identity,
     parameters: Parameters,
+    calibration: Calibration,
     assembly: Assembly,
     decoder: ToShoeDecoder,
     outbox: Outbox<STEPS>,
@@ -107,11 +104,12 @@ pub struct Link<const STEPS: usize> {
 }
 
 impl<const STEPS: usize> Link<STEPS> {
-    /// Before the first byte. `parameters` are those in effect.
-    pub fn new(identity: Identity, parameters: &Parameters, pace: Pace) -> Self {
+    /// Before the first byte. `parameters` and `calibration` are those in effect.
+    pub fn new(identity: Identity, parameters: &Parameters, calibration: &Calibration, pace: Pace) -> Self {
         Self {
             identity,
             parameters: *parameters,
+            calibration: *calibration,
             assembly: Assembly::new(),
             decoder: ToShoeDecoder::new(),
             outbox: Outbox::new(identity.boot, pace),
@@ -203,22 +201,19 @@ impl<const STEPS: usize> Link<STEPS> {
         let ask = |request| CommandState::Waiting(command.number, request);
         let tell = |outcome| CommandState::Answered(command.number, outcome);
         peer.command = match command.action {
-            Action::Reset => ask(Request::Reset),
-            Action::Init => ask(Request::Init),
-            Action::Track => ask(Request::Track),
-            Action::FloorMode(mode) => ask(Request::FloorMode(mode)),
-            Action::Calibrate(calibration) => ask(Request::Calibrate(calibration)),
-            Action::WriteParameters(chunk) => match self.assembly.push(&chunk) {
-                Ok(Some(parameters)) => ask(Request::Parameters(parameters)),
+            Action::Order(order) => ask(Request::Order(order)),
+            Action::Raw(on) => ask(Request::Raw(on)),
+            Action::Write(item, chunk) => match self.assembly.push(item, &chunk) {
+                Ok(Some(value)) => ask(Request::Write(value)),
                 Ok(None) => tell(Outcome::Done),
                 Err(refusal) => tell(Outcome::Refused(refusal)),
             },
-            Action::ReadParameters(offset) => {
-                tell(transfer::chunk(&self.parameters, offset).map_or_else(Outcome::Refused, Outcome::Parameters))
-            }
-            Action::Raw(on) => {
-                self.raw = on;
-                tell(Outcome::Done)
+            Action::Read(item, offset) => {
+                let value = match item {
+                    Item::Parameters => Value::Parameters(self.parameters),
+                    Item::Calibration => Value::Calibration(self.calibration),
+                };
+                tell(value.chunk(offset).map_or_else(Outcome::Refused, Outcome::Piece))
             }
             Action::Resend => {
                 self.outbox.resend_all(now);
@@ -240,8 +235,13 @@ impl<const STEPS: usize> Link<STEPS> {
     pub fn answer(&mut self, result: Result<(), Refusal>) {
         let Some(peer) = &mut self.peer else { return };
         let CommandState::Running(number, request) = peer.command else { return };
-        if let (Request::Parameters(parameters), Ok(())) = (request, result) {
-            self.parameters = parameters;
+        if result.is_ok() {
+            match request {
+                Request::Write(Value::Parameters(parameters)) => self.parameters = parameters,
+                Request::Write(Value::Calibration(calibration)) => self.calibration = calibration,
+                Request::Raw(on) => self.raw = on,
+                Request::Order(_) => {}
+            }
         }
         peer.command = CommandState::Answered(number, result.map_or_else(Outcome::Refused, |()| Outcome::Done));
         peer.reply_due = true;
@@ -296,7 +296,6 @@ mod tests {
     use super::super::frame::AnyDecoder;
     use super::super::golden;
     use super::super::message::Ack;
-    use super::super::transfer::chunk;
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec;
@@ -305,7 +304,7 @@ mod tests {
 
     fn link() -> Link<16> {
         let identity = Identity { boot: 3, firmware: "1.2.3", board: "bench" };
-        Link::new(identity, &Parameters::default(), Pace::default())
+        Link::new(identity, &Parameters::default(), &Calibration::default(), Pace::default())
     }
 
     fn hear(link: &mut Link<16>, message: &ToShoe, now: Micros) {
@@ -377,20 +376,20 @@ mod tests {
     #[test]
     fn a_command_is_carried_out_once_and_answered_each_time_it_comes() {
         let mut link = connected();
-        let init = command(1, Action::Init);
+        let init = command(1, Action::Order(Order::Init));
         hear(&mut link, &init, Micros(1));
-        assert_eq!(link.request(), Some(Request::Init));
+        assert_eq!(link.request(), Some(Request::Order(Order::Init)));
         // It is still being carried out when it comes again, and so is another one.
         hear(&mut link, &init, Micros(1));
-        hear(&mut link, &command(2, Action::Reset), Micros(1));
+        hear(&mut link, &command(2, Action::Order(Order::Reset)), Micros(1));
         assert_eq!((link.request(), replies(&mut link)), (None, Vec::new()));
         link.answer(Err(Refusal::NotNow));
         let reply = (1, Outcome::Refused(Refusal::NotNow));
         assert_eq!(replies(&mut link), std::slice::from_ref(&reply));
         hear(&mut link, &init, Micros(1));
         assert_eq!((link.request(), replies(&mut link)), (None, [reply].into()));
-        hear(&mut link, &command(2, Action::Reset), Micros(1));
-        assert_eq!(link.request(), Some(Request::Reset));
+        hear(&mut link, &command(2, Action::Order(Order::Reset)), Micros(1));
+        assert_eq!(link.request(), Some(Request::Order(Order::Reset)));
         link.answer(Ok(()));
         assert_eq!(replies(&mut link), [(2, Outcome::Done)]);
         hear(&mut link, &init, Micros(1));
@@ -401,14 +400,20 @@ mod tests {
     fn the_numbers_of_another_session_begin_anew() {
         let mut link = connected();
         hear(&mut link, &command(1, Action::Raw(true)), Micros(1));
+        assert_eq!((link.request(), link.raw()), (Some(Request::Raw(true)), false));
+        link.answer(Ok(()));
         assert!(link.raw());
         hear(&mut link, &hello(SESSION + 1, SCHEMA), Micros(2));
         assert!(!link.raw());
         say(&mut link, Micros(2));
         hear(&mut link, &command(2, Action::Raw(true)), Micros(3));
-        assert!(!link.raw() && replies(&mut link).is_empty(), "a command of the session before");
-        hear(&mut link, &ToShoe::Command(Command { session: SESSION + 1, number: 1, action: Action::Init }), Micros(4));
-        assert_eq!(link.request(), Some(Request::Init));
+        assert!(link.request().is_none() && replies(&mut link).is_empty(), "a command of the session before");
+        hear(
+            &mut link,
+            &ToShoe::Command(Command { session: SESSION + 1, number: 1, action: Action::Order(Order::Init) }),
+            Micros(4),
+        );
+        assert_eq!(link.request(), Some(Request::Order(Order::Init)));
     }
 
     #[test]
@@ -417,35 +422,35 @@ mod tests {
         let mut link = connected();
         let (mut number, mut offset) = (0, 0);
         loop {
-            let piece = chunk(&new, offset).unwrap();
+            let piece = Value::Parameters(new).chunk(offset).unwrap();
             offset += piece.bytes.len() as u16;
             number += 1;
             let total = piece.total;
-            hear(&mut link, &command(number, Action::WriteParameters(piece)), Micros(1));
+            hear(&mut link, &command(number, Action::Write(Item::Parameters, piece)), Micros(1));
             if offset == total {
                 break;
             }
             assert_eq!(replies(&mut link), [(number, Outcome::Done)]);
         }
-        hear(&mut link, &command(number + 1, Action::ReadParameters(0)), Micros(1));
-        assert_eq!(link.request(), Some(Request::Parameters(new)));
+        hear(&mut link, &command(number + 1, Action::Read(Item::Parameters, 0)), Micros(1));
+        assert_eq!(link.request(), Some(Request::Write(Value::Parameters(new))));
         link.answer(Ok(()));
         assert_eq!(replies(&mut link), [(number, Outcome::Done)]);
-        hear(&mut link, &command(number + 1, Action::ReadParameters(128)), Micros(1));
-        assert_eq!(replies(&mut link), [(number + 1, Outcome::Parameters(chunk(&new, 128).unwrap()))]);
+        hear(&mut link, &command(number + 1, Action::Read(Item::Parameters, 128)), Micros(1));
+        assert_eq!(replies(&mut link), [(number + 1, Outcome::Piece(Value::Parameters(new).chunk(128).unwrap()))]);
     }
 
     #[test]
     fn refused_parameters_leave_the_old_ones() {
         let mut link = connected();
         for offset in [0, 128, 256] {
-            let piece = chunk(&Parameters::documented(), offset).unwrap();
-            hear(&mut link, &command(1 + u32::from(offset), Action::WriteParameters(piece)), Micros(1));
+            let piece = Value::Parameters(Parameters::documented()).chunk(offset).unwrap();
+            hear(&mut link, &command(1 + u32::from(offset), Action::Write(Item::Parameters, piece)), Micros(1));
         }
-        assert!(matches!(link.request(), Some(Request::Parameters(_))));
-        link.answer(Err(Refusal::Parameters));
-        hear(&mut link, &command(999, Action::ReadParameters(0)), Micros(1));
-        let old = Outcome::Parameters(chunk(&Parameters::default(), 0).unwrap());
+        assert!(matches!(link.request(), Some(Request::Write(Value::Parameters(_)))));
+        link.answer(Err(Refusal::Value));
+        hear(&mut link, &command(999, Action::Read(Item::Parameters, 0)), Micros(1));
+        let old = Outcome::Piece(Value::Parameters(Parameters::default()).chunk(0).unwrap());
         assert_eq!(replies(&mut link).last(), Some(&(999, old)));
     }
 

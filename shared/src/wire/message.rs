@@ -5,16 +5,14 @@
 
 use super::frame::FrameCounters;
 use super::packed::PackedStep;
-use super::transfer::Chunk;
+use super::transfer::{Chunk, Item};
+use crate::bmx055::{Batch, DieCounters};
 use crate::step::FloorMode;
 use crate::time::Micros;
 use crate::tracker::{Counters, State};
-use heapless::{String, Vec};
+use heapless::String;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
-
-/// Frames that one [`Raw`] message holds.
-pub const RAW_FRAMES: usize = 32;
 
 /// As much of `text` as fits, cut between characters.
 pub fn text<const N: usize>(text: &str) -> String<N> {
@@ -38,7 +36,7 @@ pub enum FromShoe {
     Reply(Reply),
     /// The answer to a [`ToShoe::TimeRequest`].
     TimeReply(TimeReply),
-    /// What the sensor read.
+    /// What went into the tracker.
     Raw(Raw),
     /// Where the foot is.
     Attitude(Attitude),
@@ -126,28 +124,38 @@ pub struct TimeReply {
     pub sent: Micros,
 }
 
-/// A die of the sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Die {
-    /// Accelerometer.
-    Accel,
-    /// Gyroscope.
-    Gyro,
-}
-
-/// Register counts at full rate, as they came out of a FIFO.
+/// Everything that went into the tracker, in its order, since the laptop asked for it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Raw {
-    /// Where they come from.
-    pub die: Die,
-    /// Number of the first frame since the boot; a jump tells how many are missing.
-    pub sequence: u32,
-    /// When the last frame was taken, as far as the interrupt of the FIFO tells.
-    pub stamp: Micros,
-    /// The FIFO had run over: frames were lost before these.
-    pub lost: bool,
-    /// x, y, z. **Units:** least significant bits; **Frame:** sensor.
-    pub frames: Vec<[i16; 3], RAW_FRAMES>,
+    /// Counts up from 0, which is the [`RawItem::Start`]; a jump tells how many were lost.
+    pub number: u32,
+    /// What went in.
+    pub item: RawItem,
+}
+
+/// One thing that went into the tracker.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[expect(clippy::large_enum_variant, reason = "there is no heap on the shoe, and nearly all are batches")]
+pub enum RawItem {
+    /// The tracker was reset, so that what follows leads to the same steps again.
+    Start,
+    /// What the sensor read.
+    Batch(Batch),
+    /// What the laptop commanded.
+    Order(Order),
+}
+
+/// A command that changes what the tracker does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Order {
+    /// Back to RESET.
+    Reset,
+    /// Wait for a rest and start from there.
+    Init,
+    /// Start from the next stance, without waiting for a rest.
+    Track,
+    /// What the ground does, as the map knows it; `None` leaves it to the tracker.
+    FloorMode(Option<FloorMode>),
 }
 
 /// The state of the tracker, often enough to be drawn.
@@ -165,23 +173,6 @@ pub struct Attitude {
     pub displacement: [f32; 3],
     /// **Units:** m/s; **Frame:** heading frame of the last stance.
     pub velocity: [f32; 3],
-    /// What the stance detector goes by. **Units:** those of the detector.
-    pub statistic: f32,
-}
-
-/// How often something happened on one die since the boot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct DieCounters {
-    /// Frames read.
-    pub frames: u32,
-    /// Times the FIFO had run over.
-    pub overruns: u32,
-    /// Transfers on the bus that failed.
-    pub bus_errors: u32,
-    /// Registers that did not read back as written.
-    pub readback_errors: u32,
-    /// Times the die was set up anew.
-    pub restarts: u32,
 }
 
 /// What the shoe's end of the wire has counted since the boot.
@@ -285,37 +276,16 @@ pub struct Command {
 /// What the laptop may ask for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Action {
-    /// Back to RESET.
-    Reset,
-    /// Wait for a rest and start from there.
-    Init,
-    /// Start from the next stance, without waiting for a rest.
-    Track,
-    /// What the ground does, as the map knows it; `None` leaves it to the tracker.
-    FloorMode(Option<FloorMode>),
-    /// Send [`Raw`] messages, or stop.
+    /// Something for the tracker.
+    Order(Order),
+    /// Send [`Raw`] messages, or stop. To begin with, the tracker is reset.
     Raw(bool),
-    /// A piece of new parameters; the last one puts them into effect.
-    WriteParameters(Chunk),
-    /// The piece of the parameters in effect that begins at this byte.
-    ReadParameters(u16),
-    /// A step of a calibration.
-    Calibrate(Calibration),
+    /// A piece of a new value; the last one puts it into effect.
+    Write(Item, Chunk),
+    /// The piece of the value in effect that begins at this byte.
+    Read(Item, u16),
     /// Send all unacknowledged steps again now.
     Resend,
-}
-
-/// The steps of a calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Calibration {
-    /// Begin a new one.
-    Begin,
-    /// The shoe lies still in the pose of this number.
-    Pose(u8),
-    /// Keep the result.
-    Store,
-    /// Forget it.
-    Abort,
 }
 
 /// The one answer to a command.
@@ -336,8 +306,8 @@ pub enum Outcome {
     Done,
     /// It was not, and nothing changed.
     Refused(Refusal),
-    /// A piece of the parameters.
-    Parameters(Chunk),
+    /// A piece of a value.
+    Piece(Chunk),
 }
 
 /// Why a command was not carried out.
@@ -349,12 +319,12 @@ pub enum Refusal {
     NotNow,
     /// It was tried and failed.
     Failed,
-    /// The piece of the parameters does not follow the one before: the next one begins at this byte.
+    /// The piece does not follow the one before: the next one begins at this byte.
     Piece(u16),
-    /// The parameters are longer than the shoe can take.
+    /// The value is longer than the shoe can take.
     TooLong,
-    /// The checksum of the parameters is that of other bytes.
+    /// The checksum of the value is that of other bytes.
     Checksum,
-    /// The bytes are no parameters of this version, or their values make no sense.
-    Parameters,
+    /// The bytes are no such value of this version, or its numbers make no sense.
+    Value,
 }

@@ -2,8 +2,8 @@
 //!
 //! A [`message`] is a postcard value with a checksum in a [`frame`]. A finished step is packed into 40 bytes
 //! ([`packed`]), kept in the [`outbox`] of the shoe until the laptop has acknowledged it, and put in order by the laptop's
-//! [`inbox`]. [`link`] is the shoe's whole end of the wire; the laptop's is in the `sohle` crate. Parameters, the one
-//! thing too long for a message, go in pieces ([`transfer`]).
+//! [`inbox`]. [`link`] is the shoe's whole end of the wire; the laptop's is in the `sohle` crate. Parameters and calibration,
+//! which are too long for a message, go in pieces ([`transfer`]).
 //!
 //! Both ends compile this module, so there is no second definition of anything; [`SCHEMA`] tells two ends apart that were
 //! compiled from different ones.
@@ -18,6 +18,7 @@ pub mod outbox;
 pub mod packed;
 pub mod transfer;
 
+use crate::calibration::Calibration;
 use crate::tracker::Parameters;
 use message::{FromShoe, ToShoe};
 use postcard_schema::key::hash::fnv1a64::hash_ty_path;
@@ -25,5 +26,5 @@ use postcard_schema::key::hash::fnv1a64::hash_ty_path;
 /// Counts up when a message changes its meaning but not its fields, which [`SCHEMA`] would not show.
 pub const PROTOCOL: u16 = 1;
 
-/// Hash over the names and types of all fields of all messages and of the tracker's parameters.
-pub const SCHEMA: u64 = u64::from_le_bytes(hash_ty_path::<(FromShoe, ToShoe, Parameters)>("sohle/wire"));
+/// Hash over the names and types of all fields of all messages, of the tracker's parameters and of the calibration.
+pub const SCHEMA: u64 = u64::from_le_bytes(hash_ty_path::<(FromShoe, ToShoe, Parameters, Calibration)>("sohle/wire"));
