@@ -6,12 +6,13 @@ use crate::evaluation::endurance::{Judge, Window};
 use crate::simulation::{Scenario, Simulation};
 use sohle_shared::time::Micros;
 use sohle_shared::tracker::{Counters, Parameters, Tracker};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// Simulates walking for hours to months and compares the steps of the first hour with those of the last
 #[derive(Debug, clap::Args)]
 #[command(after_help = "A day at 200 Hz takes about a minute, a month half an hour; nothing is kept in memory.\n\n\
-Example:\n  sohle endurance --days 30")]
+Example:\n  sohle endurance --days 30 --rate 100")]
 pub struct Args {
     /// How long the person walks
     #[arg(long, value_name = "DAYS", default_value_t = 1.0)]
@@ -55,6 +56,8 @@ fn walk(scenario: &Scenario, settings: &Parameters, quiet: bool) -> Result<(Vec<
     let mut tracker = Tracker::new(settings);
     let mut judge = Judge::new(HOUR_S);
     let bar = progress(scenario.duration.unwrap_or_default() as u64, "walking", quiet);
+    // Where a bar cannot be seen, who waits half an hour still wants to know.
+    let told_by_line = !quiet && !std::io::stderr().is_terminal();
     let mut shown = Micros(0);
     for moment in Simulation::new(scenario)? {
         if let Some(step) = tracker.push(&moment.sample).step {
@@ -64,6 +67,10 @@ fn walk(scenario: &Scenario, settings: &Parameters, quiet: bool) -> Result<(Vec<
             judge.stance(stance);
         }
         if moment.sample.time.since(shown) > 60.0 {
+            let tenths = |time: Micros| (10.0 * time.as_seconds() / scenario.duration.unwrap_or(f64::INFINITY)) as u32;
+            if told_by_line && tenths(moment.sample.time) > tenths(shown) {
+                eprintln!("walking: {} %", 10 * tenths(moment.sample.time));
+            }
             shown = moment.sample.time;
             bar.set_position(shown.as_seconds() as u64);
         }
