@@ -5,10 +5,11 @@
 //! one [`Step`](step::Step) at the end of each stance. The same code runs on the microcontroller and, against recorded
 //! walks, on a PC; it gives the same bits on both.
 //!
-//! The data are types with units: [`time`], [`sample`] and [`step`]. Rotations are in [`so3`], the detectors that tell
-//! when the foot stands in [`stance`], the filters that follow it in [`filter`]. [`calibration`] takes out of the samples
-//! what is known of the unit. Everything comes together in [`tracker`]; `wire` (a feature) carries what it finds to the
-//! laptop; [`selftest`] proves that a processor computes it as every other does.
+//! [`bmx055`] reads the sensor and brings its clocks together. The data are types with units: [`time`], [`sample`] and
+//! [`step`]. Rotations are in [`so3`], the detectors that tell when the foot stands in [`stance`], the filters that follow
+//! it in [`filter`]. [`calibration`] takes out of the samples what is known of the unit. Everything comes together in
+//! [`tracker`]; `wire` (a feature) carries what it finds to the laptop; [`selftest`] proves that a processor computes it
+//! as every other does.
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]

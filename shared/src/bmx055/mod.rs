@@ -1,5 +1,25 @@
 //! The BMX055: three dies in one package, of which two feed the tracker.
+//!
+//! The accelerometer, the gyroscope and the magnetometer each have a chip select, registers and a clock of their own; the
+//! package only holds them together. The [`driver`] sets them up as the [`config`] says and reads their FIFOs.
+//! Everything that comes out of it is a [`Batch`].
+//!
+//! [`twin`] is the sensor without the sensor; [`blocking`] is for those whose bus is not asynchronous.
 
 pub mod batch;
+pub mod blocking;
+mod channel;
+pub mod config;
+pub mod driver;
+mod port;
+pub mod registers;
+#[cfg(test)]
+mod rig;
+pub mod trial;
+pub mod twin;
 
 pub use batch::{BATCH_FRAMES, Batch, Die, DieCounters};
+pub use channel::State;
+pub use config::Config;
+pub use driver::Bmx055;
+pub use port::Error;
