@@ -62,3 +62,17 @@ pub struct DieCounters {
     /// Times the die was set up anew.
     pub restarts: u32,
 }
+
+impl DieCounters {
+    /// Nothing has happened.
+    pub const NONE: Self = Self {
+        frames: 0,
+        overruns: 0,
+        invalid_frames: 0,
+        missed_interrupts: 0,
+        bus_errors: 0,
+        bad_ids: 0,
+        readback_errors: 0,
+        restarts: 0,
+    };
+}

@@ -10,6 +10,7 @@ pub mod batch;
 pub mod blocking;
 mod channel;
 pub mod config;
+pub mod counts;
 pub mod driver;
 mod port;
 pub mod registers;

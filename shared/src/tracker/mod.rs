@@ -118,6 +118,21 @@ pub enum State {
     Tracking,
 }
 
+/// A command to the tracker (Foot, 4.4.2): what a map or a person knows better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
+pub enum Order {
+    /// [`Tracker::reset`].
+    Reset,
+    /// [`Tracker::initialise`].
+    Init,
+    /// [`Tracker::start_moving`].
+    Track,
+    /// [`Tracker::command_floor_mode`].
+    FloorMode(Option<FloorMode>),
+}
+
 /// What one sample led to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
@@ -251,6 +266,17 @@ impl Tracker {
             Way::Own(own) => own.start_moving(),
             Way::Documented(_) => false,
         }
+    }
+
+    /// Carries an order out. Whether it could be in the present state; if not, nothing has changed.
+    pub fn obey(&mut self, order: Order) -> bool {
+        match order {
+            Order::Reset => self.reset(),
+            Order::Init => self.initialise(),
+            Order::Track => return self.start_moving(),
+            Order::FloorMode(mode) => self.command_floor_mode(mode),
+        }
+        true
     }
 
     /// What the tracker is doing.

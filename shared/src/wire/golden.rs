@@ -5,11 +5,11 @@ use super::message::*;
 use super::packed::PackedStep;
 use super::transfer::{self, Item};
 use super::{PROTOCOL, SCHEMA};
-use crate::bmx055::{BATCH_FRAMES, Batch, Die, DieCounters};
+use crate::bmx055::{BATCH_FRAMES, Batch, Config, Die, DieCounters};
 use crate::sample::ClippedSamples;
 use crate::step::{FloorMode, Step, StepQuality};
 use crate::time::Micros;
-use crate::tracker::{Counters, State};
+use crate::tracker::{Counters, Order, State};
 use nalgebra::{Matrix4, Vector3};
 use serde::Serialize;
 use std::fmt::{Debug, Write};
@@ -126,7 +126,7 @@ fn from_shoe() -> Vec<FromShoe> {
         reply(Outcome::Refused(Refusal::Piece(128))),
         reply(Outcome::Piece(piece())),
         FromShoe::TimeReply(TimeReply { number: 9, received: Micros(1_000_000), sent: Micros(1_000_400) }),
-        FromShoe::Raw(Raw { number: 0, item: RawItem::Start }),
+        FromShoe::Raw(Raw { number: 0, item: RawItem::Start(Config::default()) }),
         FromShoe::Raw(raw([0, -12, 2_040])),
         FromShoe::Raw(Raw { number: 1, item: RawItem::Order(Order::FloorMode(Some(FloorMode::Stairs))) }),
         FromShoe::Attitude(attitude()),

@@ -6,8 +6,7 @@
 
 use super::frame::{self, Decoder, FRAME_MAX};
 use super::message::{
-    Action, Command, FromShoe, Hello, LaptopHello, LinkCounters, Order, Outcome, Refusal, Reply, TimeReply, ToShoe,
-    text,
+    Action, Command, FromShoe, Hello, LaptopHello, LinkCounters, Outcome, Refusal, Reply, TimeReply, ToShoe, text,
 };
 use super::outbox::{Outbox, Pace};
 use super::packed::PackedStep;
@@ -17,7 +16,7 @@ use super::{PROTOCOL, SCHEMA};
 use crate::calibration::Calibration;
 use crate::step::Step;
 use crate::time::Micros;
-use crate::tracker::Parameters;
+use crate::tracker::{Order, Parameters};
 
 /// Between two hellos that nobody answers. **Units:** microseconds.
 const HELLO_US: i64 = 1_000_000;

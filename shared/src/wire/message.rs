@@ -6,10 +6,9 @@
 use super::frame::FrameCounters;
 use super::packed::PackedStep;
 use super::transfer::{Chunk, Item};
-use crate::bmx055::{Batch, DieCounters};
-use crate::step::FloorMode;
+use crate::bmx055::{Batch, Config, DieCounters};
 use crate::time::Micros;
-use crate::tracker::{Counters, State};
+use crate::tracker::{Counters, Order, State};
 use heapless::String;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -138,24 +137,11 @@ pub struct Raw {
 #[expect(clippy::large_enum_variant, reason = "there is no heap on the shoe, and nearly all are batches")]
 pub enum RawItem {
     /// The tracker was reset, so that what follows leads to the same steps again.
-    Start,
+    Start(Config),
     /// What the sensor read.
     Batch(Batch),
     /// What the laptop commanded.
     Order(Order),
-}
-
-/// A command that changes what the tracker does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Order {
-    /// Back to RESET.
-    Reset,
-    /// Wait for a rest and start from there.
-    Init,
-    /// Start from the next stance, without waiting for a rest.
-    Track,
-    /// What the ground does, as the map knows it; `None` leaves it to the tracker.
-    FloorMode(Option<FloorMode>),
 }
 
 /// The state of the tracker, often enough to be drawn.
