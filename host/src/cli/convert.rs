@@ -1,23 +1,24 @@
-//! `sohle convert`: any recording into the project's own format.
+//! `sohle convert`: any recording into the project's own format, or into what a sensor's registers would have shown.
 
 use super::{Error, print};
-use crate::recording::{self, Profile, Recording, mcap, profile};
+use crate::recording::{self, Profile, Recording, counts, mcap, profile};
 use indicatif::{ProgressBar, ProgressStyle};
 use sohle_shared::sample::ImuSample;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Converts a recording to the format of this program (MCAP)
+/// Converts a recording to the format of this program (MCAP), or to a sensor's counts for the emulated shoe
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  sohle convert short_walk.csv walk.mcap\n  \
                         sohle convert imu_sample.csv left.mcap --profile gaitmap-left\n  \
-                        sohle convert mine.txt mine.mcap --profile columns.toml")]
+                        sohle convert mine.txt mine.mcap --profile columns.toml\n  \
+                        sohle convert walk.mcap walk.counts")]
 pub struct Args {
     /// The recording to read: CSV or other text, MATLAB v5, MCAP
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// The file to write
-    #[arg(value_name = "OUT.mcap")]
+    /// The file to write: a recording, or what a BMX055 would have had in its registers
+    #[arg(value_name = "OUT.mcap|OUT.counts")]
     output: PathBuf,
     /// How to read it: the name of a layout or a TOML file with a mapping of columns; recognised from the content when left out
     #[arg(long, value_name = "NAME|FILE.toml", long_help = long_help())]
@@ -25,7 +26,7 @@ pub struct Args {
     /// Name of the recording; that of the file when left out
     #[arg(long)]
     name: Option<String>,
-    /// Overwrite OUT.mcap if it is there
+    /// Overwrite the file if it is there
     #[arg(long)]
     force: bool,
 }
@@ -52,9 +53,14 @@ pub(super) fn long_help() -> String {
 /// Converts.
 pub fn run(args: Args) -> Result<(), Error> {
     let profile = args.profile.as_deref().map(Profile::parse).transpose()?;
-    if args.output.extension().is_none_or(|extension| extension != "mcap") {
-        return Err(Error::new(format!("{}: the file to write must end in .mcap", args.output.display())));
-    }
+    let as_counts = match args.output.extension().and_then(|extension| extension.to_str()) {
+        Some("mcap") => false,
+        Some("counts") => true,
+        _ => {
+            let output = args.output.display();
+            return Err(Error::new(format!("{output}: the file to write must end in .mcap or .counts")));
+        }
+    };
     if args.output.exists() && !args.force {
         return Err(Error::new(format!("{}: is there already; --force overwrites it", args.output.display())));
     }
@@ -62,7 +68,12 @@ pub fn run(args: Args) -> Result<(), Error> {
     if let Some(name) = args.name {
         recording.name = name;
     }
-    let size = mcap::write(&args.output, &recording)?;
+    let size = if as_counts {
+        let cannot = |error| Error::new(format!("{}: cannot write: {error}", args.output.display()));
+        counts::write(&args.output, &recording).map_err(cannot)?.1
+    } else {
+        mcap::write(&args.output, &recording)?
+    };
     print(&format!("{}written         {} ({})\n", summary(&recording), args.output.display(), readable(size)))
 }
 
@@ -181,7 +192,7 @@ mod tests {
                 .to_string()
                 .ends_with("is a directory, expected a recording")
         );
-        assert!(run(args(&input, &input)).unwrap_err().to_string().ends_with("must end in .mcap"));
+        assert!(run(args(&input, &input)).unwrap_err().to_string().ends_with("must end in .mcap or .counts"));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -5,6 +5,7 @@
 
 pub mod axes;
 mod check;
+pub mod counts;
 pub mod error;
 #[cfg(test)]
 mod fuzz;
