@@ -73,6 +73,8 @@ enum Preset {
     Detector,
     /// Walking on and on; needs --duration
     Endless,
+    /// The sensor laid down in twelve attitudes, for 'sohle calibrate'; the same seed is the same sensor in any walk
+    Calibration,
 }
 
 /// Gaits and other motions that a walk can consist of.
@@ -179,6 +181,7 @@ fn scenario(args: &Args) -> Result<Scenario, Error> {
         }
         (_, Some(Preset::Detector), _) => Scenario::detector_test(Person::default(), Gait::Walk),
         (_, Some(Preset::Endless), _) => Scenario::endless(1),
+        (_, Some(Preset::Calibration), _) => Scenario::calibration(1),
         (_, _, Some(gait)) => gait.scenario(),
         _ => Scenario::demo(),
     };

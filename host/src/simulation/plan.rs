@@ -51,6 +51,8 @@ pub enum Action {
     },
     /// It makes a stride.
     Stride(Stride),
+    /// The sensor alone moves: a hand lays it down with this direction up. **Frame:** sensor.
+    Carry([f64; 3]),
 }
 
 /// A stretch of time with one action.
@@ -78,6 +80,12 @@ const SHARP_RAD: f64 = 1.9;
 const SPOT_RAD: f64 = 1.2;
 /// Time an elevator waits before and after its ride. **Units:** s.
 const DOOR_S: f64 = 1.5;
+/// Time a hand takes to lay the sensor down, and how much longer it may take. **Units:** s.
+const CARRY_S: [f64; 2] = [1.4, 0.6];
+/// Trembling of that hand. **Units:** rad/s.
+const HAND_RAD_S: f64 = 0.15;
+/// How far off the sensor comes to lie, about each axis (standard deviation). **Units:** rad.
+const ASKEW_RAD: f64 = 0.04;
 
 /// What is left to do of a leg.
 #[derive(Debug)]
@@ -88,6 +96,7 @@ enum Task {
     Turn { heading: f64 },
     Rest { seconds: f64 },
     Ride { ride: Ride, rise: f64 },
+    Carry { up: [f64; 3] },
 }
 
 /// Plans segment after segment.
@@ -104,6 +113,8 @@ pub struct Plan {
     foothold: Foothold,
     time: f64,
     moving: bool,
+    /// Whether the sensor lies on something firm instead of being worn.
+    laid: bool,
     strides: u32,
     limit: Option<u32>,
     rest: f64,
@@ -135,6 +146,7 @@ impl Plan {
             foothold: Foothold { position: body, heading: facing },
             time: 0.0,
             moving: false,
+            laid: false,
             strides: 0,
             limit,
             rest,
@@ -182,6 +194,7 @@ impl Plan {
         let duration = usual * (1.0 + person.variability * self.mood[1].clamp(-2.5, 2.5));
         self.strides += 1;
         self.moving = true;
+        self.laid = false;
         self.segment(duration, from, to, Action::Stride(stride), shape.rocking * person.rocking)
     }
 
@@ -194,7 +207,8 @@ impl Plan {
 
     fn standing(&mut self, duration: f64) -> Segment {
         self.moving = false;
-        self.segment(duration, self.foothold, self.foothold, Action::Rest, STANDING_RAD_S * self.person.rocking)
+        let rocking = if self.laid { 0.0 } else { STANDING_RAD_S * self.person.rocking };
+        self.segment(duration, self.foothold, self.foothold, Action::Rest, rocking)
     }
 
     /// Whether the stride to come is the last one allowed.
@@ -240,6 +254,9 @@ impl Plan {
             Leg::Stand { seconds } => self.tasks.push_back(Task::Rest { seconds: *seconds }),
             Leg::SideStep { left } => self.tasks.push_back(Task::Side { left: *left }),
             Leg::Turn { heading } => self.tasks.push_back(Task::Turn { heading: *heading }),
+            Leg::Lay { up, seconds } => {
+                self.tasks.extend([Task::Carry { up: *up }, Task::Rest { seconds: *seconds }]);
+            }
         }
     }
 
@@ -326,6 +343,14 @@ impl Plan {
                 self.moving = false;
                 let action = Action::Ride { ride, pause: DOOR_S };
                 (Some(self.segment(ride.duration() + 2.0 * DOOR_S, from, to, action, rocking)), None)
+            }
+            Task::Carry { up } => {
+                let length = libm::hypot(libm::hypot(up[0], up[1]), up[2]);
+                let up = up.map(|value| value / length + ASKEW_RAD * self.random.normal().clamp(-2.5, 2.5));
+                let duration = CARRY_S[0] + CARRY_S[1] * self.random.unit();
+                self.moving = false;
+                self.laid = true;
+                (Some(self.segment(duration, self.foothold, self.foothold, Action::Carry(up), HAND_RAD_S)), None)
             }
         }
     }

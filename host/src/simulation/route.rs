@@ -1,4 +1,5 @@
-//! Where the person goes: a list of legs, each a walk, a flight of stairs, a ride, a stand or a side step.
+//! Where the person goes: a list of legs, each a walk, a flight of stairs, a ride, a stand or a side step; and where the
+//! sensor is laid down for a calibration.
 //!
 //! A route is plain data. It can be written by hand in a scenario file and will be made from a building's plan by
 //! whoever knows the building; the simulation needs no building.
@@ -65,6 +66,13 @@ pub enum Leg {
         /// The direction to face. **Units:** rad; **Frame:** world, counter-clockwise from x.
         heading: f64,
     },
+    /// A hand takes the sensor up and lays it down in another attitude, a little off. So it sits from then on.
+    Lay {
+        /// What is to point upwards, of any length. **Frame:** sensor.
+        up: [f64; 3],
+        /// How long it lies there, perfectly still. **Units:** s.
+        seconds: f64,
+    },
 }
 
 const fn one() -> f64 {
@@ -126,6 +134,11 @@ impl Leg {
             Self::Stand { seconds } => positive("seconds", *seconds),
             Self::SideStep { left } => finite("left", *left),
             Self::Turn { heading } => finite("heading", *heading),
+            Self::Lay { up, seconds } => {
+                up.iter().try_for_each(|&value| finite("up", value))?;
+                positive("the length of up", up.iter().map(|value| value.abs()).sum())?;
+                positive("seconds", *seconds)
+            }
         }
     }
 }

@@ -9,6 +9,7 @@ use super::plan::Plan;
 use super::random::{Purpose, Random};
 use super::route::{Leg, Route};
 use super::sensor::{G_M_S2, SensorModel};
+use sohle_shared::calibration::Direction;
 
 /// All that a simulation depends on: equal scenarios give equal samples, bit for bit.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -113,6 +114,15 @@ impl Scenario {
             Leg::with_gait(Gait::Walk, vec![[0.0, 0.0]]),
         ];
         Self { seed, route: Route { legs, endless: true, ..Route::default() }, ..Self::default() }
+    }
+
+    /// The sensor is laid down in the twelve attitudes that a calibration wants, a little off, with a hand's motion in
+    /// between. The unit, its errors included, is that of every scenario with the same sensor and seed.
+    pub fn calibration(seed: u64) -> Self {
+        let lay = |up: Direction| Leg::Lay { up: up.0.map(f64::from), seconds: 4.5 };
+        let legs = Direction::WANTED.map(lay).to_vec();
+        let mounting = Mounting { orientation: Orientation::Flat, place: [0.0, 0.0, 0.01] };
+        Self { seed, rest: 0.5, mounting, route: Route { legs, ..Route::default() }, ..Self::default() }
     }
 
     /// Reads a scenario from TOML. What the text leaves out has its default; an unknown key is refused.
@@ -230,7 +240,7 @@ mod tests {
 
     #[test]
     fn presets_survive_being_written_and_read() {
-        let mut presets = vec![Scenario::default(), Scenario::demo()];
+        let mut presets = vec![Scenario::default(), Scenario::demo(), Scenario::calibration(4)];
         presets.push(Scenario { duration: Some(60.0), ..Scenario::endless(3) });
         presets.extend(Scenario::detector_tests(5).into_iter().map(|(_, scenario)| scenario));
         for preset in presets {

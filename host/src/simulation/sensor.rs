@@ -240,6 +240,16 @@ impl Die {
         self.model.bits
     }
 
+    /// What the die makes of the true value: scale and misalignment of the axes. **Units:** 1.
+    pub fn response(&self) -> &Matrix3<f64> {
+        &self.response
+    }
+
+    /// What it reads of nothing, now and at `temperature`. **Units:** °C; m/s² or rad/s; **Frame:** sensor.
+    pub fn offset(&self, temperature: f64) -> Vector3<f64> {
+        self.offset + self.per_kelvin * (temperature - REFERENCE_C) + self.wandered
+    }
+
     /// Lets the offset wander for `seconds`.
     pub fn wander(&mut self, seconds: f64) {
         if self.model.wander > 0.0 {
@@ -250,8 +260,7 @@ impl Die {
 
     /// Reads the true value `truth` at `temperature` and goes on to the next sample. **Units:** m/s² or rad/s; °C.
     pub fn read(&mut self, truth: &Vector3<f64>, temperature: f64) -> Counts {
-        let mut value =
-            self.response * truth + self.offset + self.per_kelvin * (temperature - REFERENCE_C) + self.wandered;
+        let mut value = self.response * truth + self.offset(temperature);
         if self.model.noise > 0.0 {
             let sigma = self.model.noise * libm::sqrt(0.5 * self.model.rate);
             value += Vector3::from(self.random.normals()) * sigma;
