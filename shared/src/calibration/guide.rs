@@ -26,8 +26,8 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        // 3 s show the force to 0.6e-3 m/s² and the rate to 0.006 deg/s (white noise of the data sheet), below what the
-        // temperature does. The rate may be what the data sheet allows an uncorrected bias, 1 deg/s, five times.
+        // 3 s less the first rest show the force to 0.7e-3 m/s² and the rate to 0.006 deg/s (white noise of the data
+        // sheet), below what the temperature does. The rate may be what the data sheet allows an uncorrected bias, 1 deg/s, five times.
         let rest = rest::Parameters { gyro_mean: 5.0_f32.to_radians(), ..Default::default() };
         Self { hold_s: 3.0, rest }
     }
@@ -87,6 +87,9 @@ pub struct Outcome {
 }
 
 /// Rests that follow each other, as long as the sensor lies still.
+///
+/// The first is the earliest half second that passes for a rest, so the hand's last trembling is in it: it says where
+/// the sensor lies, but is neither part of the sums nor of the noise.
 #[derive(Clone, Copy, Debug)]
 struct Hold {
     since: Micros,
@@ -101,8 +104,23 @@ struct Hold {
 }
 
 impl Hold {
-    fn mean_accel(&self) -> Vector3<f32> {
-        self.accel / f32::from(self.rests.max(1))
+    fn new(time: Micros, first: &Rest) -> Self {
+        let sum = Vector3::zeros();
+        Self {
+            since: time,
+            last: time,
+            first: first.accel,
+            accel: sum,
+            gyro: sum,
+            rests: 1,
+            clipped: false,
+            told: false,
+        }
+    }
+
+    /// Mean of one of the sums, once there was more than the first rest.
+    fn mean(&self, sum: &Vector3<f32>) -> Vector3<f32> {
+        sum / f32::from(self.rests.saturating_sub(1).max(1))
     }
 
     fn up(&self) -> Direction {
@@ -175,10 +193,7 @@ impl Guide {
             return self.hold.take().and_then(Hold::broken);
         }
         match self.detector.push(increment.end, &increment.accel_mean(), &increment.gyro_mean(), 1.0) {
-            Some(rest) => {
-                self.noise.push(increment.end, &rest, increment.duration());
-                self.rested(increment.end, &rest)
-            }
+            Some(rest) => self.rested(increment.end, &rest, increment.duration()),
             None => {
                 let lost = self.hold.is_some_and(|hold| increment.end.since(hold.last) > LOST_S);
                 if lost { self.hold.take().and_then(Hold::broken) } else { None }
@@ -186,15 +201,13 @@ impl Guide {
         }
     }
 
-    /// Goes on with the hold, or begins a new one.
-    fn rested(&mut self, time: Micros, rest: &Rest) -> Option<Event> {
+    /// Goes on with the hold, or begins a new one. **Units:** period of the increments in s.
+    fn rested(&mut self, time: Micros, rest: &Rest, period: f32) -> Option<Event> {
         let same = |hold: &Hold| (hold.first - rest.accel).norm_squared() <= SAME_M_S2 * SAME_M_S2;
         let Some(mut hold) = self.hold.filter(same) else {
-            let (accel, gyro) = (rest.accel, rest.gyro);
-            let next =
-                Hold { since: time, last: time, first: accel, accel, gyro, rests: 1, clipped: false, told: false };
-            return self.hold.replace(next).and_then(Hold::broken);
+            return self.hold.replace(Hold::new(time, rest)).and_then(Hold::broken);
         };
+        self.noise.push(time, rest, period);
         hold.last = time;
         hold.accel += rest.accel;
         hold.gyro += rest.gyro;
@@ -211,7 +224,7 @@ impl Guide {
     }
 
     fn judge(&mut self, hold: &Hold) -> Option<Event> {
-        let accel = hold.mean_accel();
+        let accel = hold.mean(&hold.accel);
         let refused = |reason| Some(Event::Refused { up: hold.up(), reason });
         if let Err(reason) = self.poses.examine(&accel) {
             return if hold.rests >= MEANT_RESTS { refused(reason) } else { None };
@@ -222,7 +235,7 @@ impl Guide {
         if hold.clipped {
             return refused(Refusal::Clipped);
         }
-        let gyro = hold.gyro / f32::from(hold.rests.max(1));
+        let gyro = hold.mean(&hold.gyro);
         match self.poses.push(Pose { accel, gyro, temperature: self.temperature }) {
             Ok(up) => {
                 // Both at most 24.
@@ -415,6 +428,29 @@ mod tests {
         assert!(matches!(hand.guide.prompt(), Prompt::Turn(_)));
         assert_eq!(hand.guide.outcome().verdict.grade(), Grade::Bad);
         assert!(hand.guide.outcome().verdict.unfit.is_some());
+    }
+
+    #[test]
+    fn what_a_hand_trembles_before_it_lets_go_is_no_noise_of_the_sensor() {
+        let noise = |trembling: f32| {
+            let mut hand = Hand::new();
+            for &up in &Direction::WANTED[..6] {
+                let force = reading(up);
+                hand.give(1.0, |_| (force, Vector3::repeat(2.0)));
+                // Dies away within a third of a second: the first rest begins in it.
+                let rate = |t: f32| BIAS.add_scalar(trembling * libm::sinf(12.0 * t) * libm::expf(-10.0 * t));
+                hand.give(4.0, |t| (force, rate(t)));
+            }
+            let Outcome { calibration, verdict } = hand.guide.outcome();
+            assert_eq!(calibration.quality.poses, 6);
+            let noise = |property| verdict.findings().find(|finding| finding.property == property).unwrap().value;
+            (noise(Property::GyroNoise), noise(Property::GyroDrift))
+        };
+        let (quiet, trembling) = (noise(0.0), noise(0.15));
+        // What is left 0.6 s after it began to die away: 0.15 rad/s times e^-6, a third of the noise.
+        assert!(trembling.0 < 1.1 * quiet.0, "{trembling:?} {quiet:?}");
+        // This noise changes its sign from sample to sample, so over half a second there is none but what trembles.
+        assert!(trembling.1 < 0.1 * quiet.0, "{trembling:?} {quiet:?}");
     }
 
     #[test]
