@@ -44,7 +44,7 @@ fn version_and_help_go_to_the_standard_output() {
     assert_eq!(stdout(&version), format!("sohle {}\n", env!("CARGO_PKG_VERSION")));
     let help = sohle(home.path(), &["--help"]);
     assert!(help.status.success());
-    for command in ["demo", "replay", "parameters"] {
+    for command in ["demo", "replay", "calibrate", "parameters"] {
         assert!(stdout(&help).contains(command), "{command}");
         let help = sohle(home.path(), &[command, "--help"]);
         assert!(help.status.success() && stdout(&help).contains("Example"), "{command}");
@@ -159,6 +159,48 @@ fn a_recording_is_replayed_with_settings_of_ones_own() {
     assert_eq!(names(&folder), sorted(FILES));
     assert_eq!(read(&folder, "parameters.toml").as_bytes(), printed.stdout);
     assert!(read(&folder, "track.geojson").contains("\"crs_note\":\"WGS84"));
+}
+
+#[test]
+fn a_calibrated_sensor_is_replayed_and_the_calibration_stays_with_the_result() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let output = sohle(home.path(), arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        stdout(&output).to_owned()
+    };
+    run(&["simulate", "--preset", "calibration", "--seed", "3", "--out", "rests.mcap"]);
+    run(&["simulate", "--gait", "walk", "--strides", "8", "--seed", "3", "--out", "walk.mcap"]);
+    let told = run(&["calibrate", "rests.mcap", "--out", "unit.toml", "--gravity-at", "45.51"]);
+    assert_eq!(told.matches(" up: taken as pose ").count(), 12, "{told}");
+    assert!(told.contains("The sensor is good. Gravity was taken as 9.8067 m/s²"), "{told}");
+    assert!(run(&["calibrate", "rests.mcap", "-q"]).is_empty());
+    let default = home.path().join("sohle-out/rests");
+    assert_eq!(names(&default), ["calibration.toml"]);
+
+    run(&["replay", "walk.mcap", "--out", "raw"]);
+    let told = run(&["replay", "walk.mcap", "--calibration", "unit.toml", "--out", "corrected"]);
+    assert!(told.contains("calibration: good"), "{told}");
+    let (raw, corrected) = (home.path().join("raw"), home.path().join("corrected"));
+    assert_ne!(read(&raw, "steps.csv"), read(&corrected, "steps.csv"));
+    assert_eq!(read(&corrected, "calibration.toml"), read(home.path(), "unit.toml"));
+    assert!(!names(&raw).contains(&"calibration.toml".to_owned()));
+    // The samples stay as measured, so that nobody corrects them twice.
+    let recorded = |folder: &Path| sohle::recording::open(&folder.join("recording.mcap"), None).unwrap();
+    let (raw, corrected) = (recorded(&raw), recorded(&corrected));
+    assert_eq!(raw.samples, corrected.samples);
+    assert_eq!(corrected.metadata["calibration"], read(home.path(), "unit.toml"));
+    run(&["replay", "corrected/recording.mcap", "--out", "again"]);
+    assert!(!recorded(&home.path().join("again")).metadata.contains_key("calibration"));
+
+    let told = refusal(home.path(), &["calibrate", "walk.mcap", "--quiet"], 1);
+    assert!(told.contains("walk.mcap: 1 of 12 poses were taken, at least 6 are needed"), "{told}");
+    assert!(!home.path().join("sohle-out/walk").exists());
+    std::fs::write(home.path().join("bad.toml"), "\nshoe_size = 43\n").unwrap();
+    let told = refusal(home.path(), &["replay", "walk.mcap", "--calibration", "bad.toml"], 1);
+    assert!(told.contains("calibration file bad.toml, line 2") && told.contains("shoe_size"), "{told}");
+    assert!(refusal(home.path(), &["calibrate", "rests.mcap", "--gravity", "981"], 2).contains("9.7 to 9.9"));
+    assert!(refusal(home.path(), &["calibrate", "rests.mcap", "--gravity-at", "x"], 2).contains("LAT,HEIGHT_M"));
 }
 
 #[test]

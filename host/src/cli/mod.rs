@@ -5,6 +5,7 @@
 //! the standard error output, and an error ends the program with one line and exit code 1 (2 if the command line itself
 //! was wrong).
 
+pub mod calibrate;
 pub mod convert;
 pub mod demo;
 pub mod endurance;
@@ -42,6 +43,7 @@ pub struct Cli {
 enum Command {
     Demo(demo::Args),
     Replay(replay::Args),
+    Calibrate(calibrate::Args),
     Convert(convert::Args),
     Evaluate(evaluate::Args),
     Endurance(endurance::Args),
@@ -78,6 +80,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
     match command {
         Command::Demo(args) => demo::run(args),
         Command::Replay(args) => replay::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Endurance(args) => endurance::run(args),

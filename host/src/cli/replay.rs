@@ -2,6 +2,7 @@
 
 use super::report::{Report, Settings};
 use super::{Error, Output, convert, parameters};
+use crate::calibration;
 use crate::recording::{self, Profile};
 use std::path::PathBuf;
 
@@ -22,6 +23,9 @@ pub struct Args {
     /// Settings of the tracker as 'sohle parameters' prints them; others keep their default
     #[arg(long, value_name = "FILE.toml")]
     parameters: Option<PathBuf>,
+    /// What 'sohle calibrate' found of the sensor; every sample is corrected by it before it is tracked
+    #[arg(long, value_name = "FILE.toml")]
+    calibration: Option<PathBuf>,
     /// Tracks with the settings of the source document too, side by side
     #[arg(long)]
     compare: bool,
@@ -31,7 +35,7 @@ pub struct Args {
 
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args { file, profile, parameters, compare, output } = args;
+    let Args { file, profile, parameters, calibration, compare, output } = args;
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut settings = vec![match &parameters {
         Some(path) => Settings { label: stem(path), parameters: parameters::read(path)?, ..Settings::default() },
@@ -40,12 +44,14 @@ pub fn run(args: Args) -> Result<(), Error> {
     if compare {
         settings.push(Settings::documented());
     }
+    let calibration = calibration.as_deref().map(calibration::read).transpose()?;
     let profile = profile.map(|text| Profile::parse(&text)).transpose()?;
     let recording = recording::open(&file, profile.as_ref())?;
     let folder = output.folder(&stem(&file));
     Report {
         title: recording.name.clone(),
         recording,
+        calibration,
         settings,
         folder: &folder,
         origin: output.origin,

@@ -13,6 +13,8 @@ use crate::export::{self, Named, file};
 use crate::recording::{Recording, SimulatedTruth, mcap};
 use crate::track::Track;
 use indicatif::ProgressIterator;
+use sohle_shared::calibration::Calibration;
+use sohle_shared::sample::ImuSample;
 use sohle_shared::step::FloorMode;
 use sohle_shared::tracker::Parameters;
 use std::path::Path;
@@ -20,6 +22,9 @@ use std::time::{Duration, Instant};
 
 /// The recording as it is written beside the pictures.
 pub const RECORDING: &str = "recording.mcap";
+
+/// The calibration that the samples were corrected by.
+const CALIBRATION: &str = "calibration.toml";
 
 /// One set of settings to track with.
 pub struct Settings {
@@ -51,6 +56,8 @@ pub struct Report<'a> {
     pub title: String,
     /// The walk.
     pub recording: Recording,
+    /// What is known of the sensor. The samples are corrected by it before they are tracked, and written as they were.
+    pub calibration: Option<Calibration>,
     /// What to track it with; the first is the one that matters.
     pub settings: Vec<Settings>,
     /// Where the outputs go.
@@ -74,10 +81,11 @@ impl Report<'_> {
     /// Does it all.
     pub fn run(self) -> Result<(), Error> {
         file::folder(self.folder)?;
-        let Self { title, mut recording, settings, folder, origin, quiet } = self;
-        let outcomes: Vec<_> = settings.into_iter().map(|settings| outcome(&recording, settings, quiet)).collect();
+        let Self { title, mut recording, calibration, settings, folder, origin, quiet } = self;
+        let outcomes: Vec<_> =
+            settings.into_iter().map(|settings| outcome(&recording, calibration.as_ref(), settings, quiet)).collect();
         let table = table(&recording, &outcomes);
-        let picture = picture(title, &recording, &outcomes, &table);
+        let picture = picture(title, note(&recording, calibration.as_ref(), &outcomes), &recording, &outcomes, &table);
         if !quiet {
             let timed = timed(table, &outcomes);
             print(&format!("{}\n{}\n\n{}\n{}", picture.title, picture.note, timed.text(), remarks(&outcomes)))?;
@@ -88,6 +96,14 @@ impl Report<'_> {
         let mut files = export::write_all(folder, &picture, &named, origin)?;
         if let Some(first) = outcomes.first() {
             recording.steps.clone_from(&first.track.steps);
+        }
+        // One that an earlier result brings along says nothing of this one.
+        recording.metadata.remove("calibration");
+        if let Some(calibration) = calibration {
+            let text = toml::to_string(&calibration)?;
+            file::write(&folder.join(CALIBRATION), text.as_bytes())?;
+            files.push(CALIBRATION.to_owned());
+            recording.metadata.insert("calibration".into(), text);
         }
         mcap::write(&folder.join(RECORDING), &recording)?;
         files.push(RECORDING.to_owned());
@@ -106,10 +122,11 @@ impl Outcome {
 }
 
 /// Tracks a recording and compares the track with what is known.
-fn outcome(recording: &Recording, settings: Settings, quiet: bool) -> Outcome {
+fn outcome(recording: &Recording, calibration: Option<&Calibration>, settings: Settings, quiet: bool) -> Outcome {
     let bar = progress(recording.samples.len() as u64, &format!("tracking ({})", settings.label), quiet);
     let begun = Instant::now();
-    let track = Track::of(recording.samples.iter().copied().progress_with(bar), &settings.parameters);
+    let correct = |sample: &ImuSample| calibration.map_or(*sample, |calibration| calibration.apply(sample, None));
+    let track = Track::of(recording.samples.iter().map(correct).progress_with(bar), &settings.parameters);
     let taken = begun.elapsed();
     let metrics = recording.truth.as_ref().map(|truth| score(&track, &Truth::from(truth)));
     let placement = recording.truth.as_ref().map_or_else(Placement::default, |truth| placement(&track, truth));
@@ -194,9 +211,9 @@ fn timed(mut table: Table, outcomes: &[Outcome]) -> Table {
 }
 
 /// The tracks, the truth, and their figures.
-fn picture(title: String, recording: &Recording, outcomes: &[Outcome], table: &Table) -> Picture {
+fn picture(title: String, note: String, recording: &Recording, outcomes: &[Outcome], table: &Table) -> Picture {
     let mut picture = Picture::new(title);
-    picture.note = note(recording, outcomes);
+    picture.note = note;
     picture.columns = table.headings().to_vec();
     for (outcome, row) in outcomes.iter().zip(table.rows()) {
         picture.lines.push(Line::of(&outcome.named(""), row.cells.clone()));
@@ -211,8 +228,9 @@ fn picture(title: String, recording: &Recording, outcomes: &[Outcome], table: &T
     picture
 }
 
-/// How long the recording is, how dense, and how the tracks were laid.
-fn note(recording: &Recording, outcomes: &[Outcome]) -> String {
+/// How long the recording is, how dense, by what it was corrected, and how the tracks were laid.
+fn note(recording: &Recording, calibration: Option<&Calibration>, outcomes: &[Outcome]) -> String {
+    let corrected = calibration.map(|known| format!("; calibration: {}", known.quality.grade)).unwrap_or_default();
     let laid = if recording.truth.is_some() {
         format!("; tracks laid on the truth by their first {ALIGNED_START_M} m")
     } else if outcomes.len() > 1 {
@@ -221,7 +239,7 @@ fn note(recording: &Recording, outcomes: &[Outcome]) -> String {
         String::new()
     };
     let (seconds, rate, samples) = (recording.duration_s() as u64, recording.rate_hz(), recording.samples.len());
-    format!("{} min {:02} s, {samples} samples at {rate:.0} Hz{laid}", seconds / 60, seconds % 60)
+    format!("{} min {:02} s, {samples} samples at {rate:.0} Hz{corrected}{laid}", seconds / 60, seconds % 60)
 }
 
 /// What was unusual, one line for each set of settings that met something.

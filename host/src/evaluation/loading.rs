@@ -4,6 +4,7 @@ use super::manifest::{Entry, Manifest};
 use super::source::{Instants, Layout, Mirrored, Paths, PointsSource, StillSource, StridesSource};
 use super::table::{Table, TableError};
 use super::truth::{KnownStride, Reference, Surveyed, Truth};
+use crate::calibration::{self, CalibrationFileError};
 use crate::recording::mapping::Column;
 use crate::recording::unit::TimeUnit;
 use crate::recording::{self, ProfileError, Recording, RecordingError, SimulatedTruth};
@@ -27,6 +28,15 @@ pub enum LoadError {
     /// The profile cannot be used.
     #[error(transparent)]
     Profile(#[from] ProfileError),
+    /// The file of the sensor's calibration is not there.
+    #[error("calibration {}: no such file", path.display())]
+    Uncalibrated {
+        /// As the manifest has it.
+        path: PathBuf,
+    },
+    /// The calibration cannot be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationFileError),
     /// The walk cannot be simulated.
     #[error("simulate: {0}")]
     Simulation(String),
@@ -51,15 +61,24 @@ const OVERHANG_US: i64 = 100_000;
 /// One true pose of a simulated walk is kept for so many samples: a hundred in a second.
 const THINNING: usize = 20;
 
-/// Reads or simulates the samples of `entry`.
+/// Reads or simulates the samples of `entry`, and corrects them if the sensor was calibrated.
 pub fn samples(manifest: &Manifest, entry: &Entry) -> Result<Recording, LoadError> {
-    if let Some(source) = &entry.simulate {
+    let mut recording = if let Some(source) = &entry.simulate {
         let scenario = manifest.scenario(source).map_err(LoadError::Simulation)?;
-        return simulated(&scenario).map_err(|error| LoadError::Simulation(error.to_string()));
+        simulated(&scenario).map_err(|error| LoadError::Simulation(error.to_string()))?
+    } else {
+        let named = entry.path.clone().unwrap_or_default();
+        let path = manifest.locate(&named).ok_or(LoadError::Absent { path: named })?;
+        recording::open(&path, Some(&manifest.profile(entry)?))?
+    };
+    if let Some(named) = &entry.calibration {
+        let path = manifest.locate(named).ok_or_else(|| LoadError::Uncalibrated { path: named.clone() })?;
+        let calibration = calibration::read(&path)?;
+        for sample in &mut recording.samples {
+            *sample = calibration.apply(sample, None);
+        }
     }
-    let named = entry.path.clone().unwrap_or_default();
-    let path = manifest.locate(&named).ok_or(LoadError::Absent { path: named })?;
-    Ok(recording::open(&path, Some(&manifest.profile(entry)?))?)
+    Ok(recording)
 }
 
 /// The walk of `scenario` as a recording with its truth.
@@ -278,6 +297,28 @@ mod tests {
         manifest.locate(entry.path.as_ref()?)?;
         let recording = samples(&manifest, entry).unwrap();
         Some((super::truth(&manifest, entry, &recording).unwrap(), recording))
+    }
+
+    #[test]
+    fn samples_of_a_calibrated_sensor_are_corrected() {
+        let folder = tempfile::tempdir().unwrap();
+        let put = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        put("still.toml", "duration = 0.1\n");
+        put("unit.toml", "[accel]\nbias = [0.5, 0.0, 0.0]\n");
+        put("bad.toml", "[accel]\nbias = 0.5\n");
+        let entry = |calibration: &str| {
+            format!(
+                "[[recording]]\nname = \"{calibration}\"\nsimulate = {{ scenario = \"still.toml\" }}\n{calibration}\n"
+            )
+        };
+        let keys = ["", "calibration = 'unit.toml'", "calibration = 'none.toml'", "calibration = 'bad.toml'"];
+        put("manifest.toml", &keys.map(entry).concat().replace("name = \"\"", "name = \"raw\""));
+        let manifest = Manifest::read(&folder.path().join("manifest.toml")).unwrap();
+        let [raw, corrected, missing, bad] = [0, 1, 2, 3].map(|index| samples(&manifest, &manifest.recordings[index]));
+        let (raw, corrected) = (raw.unwrap().samples, corrected.unwrap().samples);
+        assert_eq!(raw[0].accel.0 - corrected[0].accel.0, nalgebra::Vector3::new(0.5, 0.0, 0.0));
+        assert_eq!(missing.unwrap_err().to_string(), "calibration none.toml: no such file");
+        assert!(bad.unwrap_err().to_string().contains("bad.toml, line 2: "));
     }
 
     #[test]

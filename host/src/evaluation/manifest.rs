@@ -8,6 +8,7 @@ use super::source::TruthSource;
 use crate::recording::mapping::Mapping;
 use crate::recording::{Profile, ProfileError, Source, recordings_dir};
 use crate::simulation::Scenario;
+use crate::toml_file::{self, TomlFileError};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -15,24 +16,9 @@ use thiserror::Error;
 /// Why a manifest is refused.
 #[derive(Debug, Error)]
 pub enum ManifestError {
-    /// The file cannot be read.
-    #[error("manifest {}: {source}", path.display())]
-    Read {
-        /// Which file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// What stands in it is not a manifest.
-    #[error("manifest {}, line {line}: {message}", path.display())]
-    Refused {
-        /// Which file.
-        path: PathBuf,
-        /// Where; the first line is 1.
-        line: usize,
-        /// What is wrong and what was expected.
-        message: String,
-    },
+    /// The file cannot be read, or what stands in it is not a manifest.
+    #[error(transparent)]
+    File(#[from] TomlFileError),
     /// Its parts contradict each other.
     #[error("manifest {}: {message}", path.display())]
     Contradiction {
@@ -77,6 +63,8 @@ pub struct Entry {
     pub profile: Option<String>,
     /// What differs from the profile.
     pub mapping: Option<Mapping>,
+    /// What is known of the sensor, as `sohle calibrate` writes it.
+    pub calibration: Option<PathBuf>,
     /// What is known of the walk.
     #[serde(default)]
     pub truth: TruthSource,
@@ -123,13 +111,7 @@ pub struct Upstream {
 impl Manifest {
     /// Reads and checks a manifest.
     pub fn read(path: &Path) -> Result<Self, ManifestError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| ManifestError::Read { path: path.to_owned(), source })?;
-        let mut manifest: Self = toml::from_str(&text).map_err(|error| {
-            let start = error.span().map_or(0, |span| span.start.min(text.len()));
-            let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
-            ManifestError::Refused { path: path.to_owned(), line, message: error.message().replace('\n', " ") }
-        })?;
+        let mut manifest: Self = toml_file::read("manifest", path)?;
         manifest.folder = path.parent().map(Path::to_owned).unwrap_or_default();
         manifest.check().map_err(|message| ManifestError::Contradiction { path: path.to_owned(), message })?;
         Ok(manifest)

@@ -9,6 +9,7 @@ use super::plan::Plan;
 use super::random::{Purpose, Random};
 use super::route::{Leg, Route};
 use super::sensor::{G_M_S2, SensorModel};
+use crate::toml_file;
 use sohle_shared::calibration::Direction;
 
 /// All that a simulation depends on: equal scenarios give equal samples, bit for bit.
@@ -127,11 +128,7 @@ impl Scenario {
 
     /// Reads a scenario from TOML. What the text leaves out has its default; an unknown key is refused.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
-        let scenario: Self = toml::from_str(text).map_err(|error| {
-            let start = error.span().map_or(0, |span| span.start.min(text.len()));
-            let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
-            Error::Text { line, message: error.message().to_owned() }
-        })?;
+        let scenario: Self = toml_file::parse(text).map_err(|(line, message)| Error::Text { line, message })?;
         scenario.check()?;
         Ok(scenario)
     }
