@@ -1,10 +1,11 @@
-//! The laptop's side of Sohle: recordings, simulation, tracks, scores.
+//! The laptop's side of Sohle: the wire to the shoe, recordings, simulation, tracks, scores.
 
 pub mod calibration;
 pub mod cli;
 pub mod evaluation;
 pub mod export;
 pub mod gravity;
+pub mod link;
 pub mod recording;
 pub mod simulation;
 pub mod toml_file;

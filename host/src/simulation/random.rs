@@ -26,6 +26,12 @@ pub enum Purpose {
     Rocking,
     /// Noise of the gyroscope.
     GyroNoise,
+    /// What a simulated line does to what the laptop writes.
+    ToShoe,
+    /// What it does to what the shoe writes.
+    FromShoe,
+    /// Steps that nobody walked.
+    MadeUpSteps,
 }
 
 impl Random {

@@ -1,0 +1,8 @@
+//! The laptop's end of the wire.
+//!
+//! [`session`] turns the bytes of a shoe into events and decides what is said to it; [`clock`] relates the shoe's time to
+//! the laptop's. Neither opens a port nor reads a clock: bytes and time are arguments, so that [`endurance`] can let hours
+//! pass in seconds over a [`line`](mod@line) as bad as it likes. The shoe's end is [`sohle_shared::wire::link`].
+
+pub mod clock;
+pub mod line;
