@@ -11,6 +11,7 @@ pub mod demo;
 pub mod endurance;
 mod error;
 pub mod evaluate;
+pub mod line;
 pub mod parameters;
 pub mod replay;
 pub mod report;
@@ -47,6 +48,7 @@ enum Command {
     Convert(convert::Args),
     Evaluate(evaluate::Args),
     Endurance(endurance::Args),
+    Line(line::Args),
     Parameters(parameters::Args),
     Simulate(simulate::Args),
 }
@@ -84,6 +86,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Endurance(args) => endurance::run(args),
+        Command::Line(args) => line::run(args),
         Command::Parameters(args) => parameters::run(args),
         Command::Simulate(args) => simulate::run(args),
     }

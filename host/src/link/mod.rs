@@ -5,4 +5,8 @@
 //! pass in seconds over a [`line`](mod@line) as bad as it likes. The shoe's end is [`sohle_shared::wire::link`].
 
 pub mod clock;
+pub mod endurance;
+pub mod event;
 pub mod line;
+mod questions;
+pub mod session;
