@@ -8,8 +8,8 @@
 //! [`bmx055`] reads the sensor and brings its clocks together. The data are types with units: [`time`], [`sample`] and
 //! [`step`]. Rotations are in [`so3`], the detectors that tell when the foot stands in [`stance`], the filters that follow
 //! it in [`filter`]. [`calibration`] takes out of the samples what is known of the unit. Everything comes together in
-//! [`tracker`]; `wire` (a feature) carries what it finds to the laptop; [`selftest`] proves that a processor computes it
-//! as every other does.
+//! [`tracker`] and, from the registers of the sensor on, in [`shoe`]; `wire` (a feature) carries what it finds to the
+//! laptop; [`selftest`] proves that a processor computes it as every other does.
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]
@@ -26,6 +26,7 @@ pub mod preintegration;
 pub mod rest;
 pub mod sample;
 pub mod selftest;
+pub mod shoe;
 pub mod so3;
 pub mod stance;
 pub mod step;

@@ -1,0 +1,501 @@
+//! The application on the shoe.
+
+use super::pipeline::{Pipeline, celsius};
+use crate::bmx055::{Batch, Config, DieCounters};
+use crate::calibration::Calibration;
+use crate::sample::ImuSample;
+use crate::time::Micros;
+use crate::tracker::{Order, Output, Parameters, State, Tracker};
+use crate::wire::frame::{self, FRAME_MAX};
+use crate::wire::link::{Identity, Link, Request};
+use crate::wire::message::{Attitude, FromShoe, Level, Log, Raw, RawItem, Refusal, ResetReason, Status, text};
+use crate::wire::outbox::Pace;
+use crate::wire::transfer::Value;
+use heapless::Deque;
+
+/// Between two messages with the attitude. **Units:** microseconds.
+const ATTITUDE_US: i64 = 50_000;
+/// Raw messages that may wait for the line: both dies fill so many in 60 ms, and the line empties one in 3 ms.
+const RAW_WAITING: usize = 16;
+/// Lines of the log that may wait for a laptop: all that happens while the shoe starts.
+const LOGS_WAITING: usize = 8;
+
+/// What only the board knows of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Health {
+    /// Time the processor was busy since the last report. **Units:** 1/1000.
+    pub load: u16,
+    /// Longest time from a FIFO's interrupt to its samples being through the tracker, since the last report. **Units:**
+    /// microseconds.
+    pub lateness_us: u32,
+    /// **Units:** V.
+    pub battery: Option<f32>,
+    /// Largest depth of the stack since the boot. **Units:** bytes.
+    pub stack: u32,
+    /// Why the processor started.
+    pub reset: ResetReason,
+    /// Accelerometer.
+    pub accel: DieCounters,
+    /// Gyroscope.
+    pub gyro: DieCounters,
+}
+
+/// The shoe, with room for `STEPS` steps that the laptop does not have yet.
+#[derive(Debug)]
+pub struct Shoe<const STEPS: usize> {
+    sensor: Config,
+    parameters: Parameters,
+    calibration: Calibration,
+    pipeline: Pipeline,
+    link: Link<STEPS>,
+    /// Number of the next raw message.
+    raw_number: u32,
+    raw: Deque<Raw, RAW_WAITING>,
+    logs: Deque<Log, LOGS_WAITING>,
+    status: Option<Status>,
+    attitude: Option<Attitude>,
+    attitude_due: Micros,
+    /// A value that takes effect when the board has kept it.
+    keeping: Option<Value>,
+    temperature: Option<i8>,
+    /// The foot was seen to move.
+    moved: Micros,
+}
+
+impl<const STEPS: usize> Shoe<STEPS> {
+    /// A shoe that has just started, with what was kept of parameters and calibration.
+    pub fn new(identity: Identity, sensor: &Config, parameters: &Parameters, calibration: &Calibration) -> Self {
+        Self {
+            sensor: *sensor,
+            parameters: *parameters,
+            calibration: *calibration,
+            pipeline: Pipeline::new(sensor, parameters, calibration),
+            link: Link::new(identity, parameters, calibration, Pace::default()),
+            raw_number: 0,
+            raw: Deque::new(),
+            logs: Deque::new(),
+            status: None,
+            attitude: None,
+            attitude_due: Micros(i64::MIN),
+            keeping: None,
+            temperature: None,
+            moved: Micros(0),
+        }
+    }
+
+    /// The driver read something.
+    pub fn sensed(&mut self, batch: &Batch) {
+        if self.link.raw() {
+            self.record(RawItem::Batch(batch.clone()));
+        }
+        self.temperature = batch.temperature.or(self.temperature);
+        let Self { pipeline, link, attitude, attitude_due, moved, .. } = self;
+        pipeline.push(batch, |sample, output, tracker| {
+            if !output.stance {
+                *moved = sample.time;
+            }
+            if let Some(step) = &output.step {
+                link.push(step);
+            }
+            if sample.time >= *attitude_due {
+                *attitude_due = sample.time + ATTITUDE_US;
+                *attitude = Some(attitude_of(sample, output, tracker));
+            }
+        });
+    }
+
+    /// Bytes came from the laptop.
+    pub fn received(&mut self, bytes: &[u8], now: Micros) {
+        self.link.receive(bytes, now);
+        while let Some(request) = self.link.request() {
+            if let Some(result) = self.carry_out(request) {
+                self.link.answer(result);
+            }
+        }
+    }
+
+    /// Does what was asked for; `None` while it is the board's turn.
+    fn carry_out(&mut self, request: Request) -> Option<Result<(), Refusal>> {
+        match request {
+            Request::Order(order) => {
+                let obeyed = self.pipeline.obey(order);
+                if obeyed && self.link.raw() {
+                    self.record(RawItem::Order(order));
+                }
+                Some(if obeyed { Ok(()) } else { Err(Refusal::NotNow) })
+            }
+            Request::Raw(on) => {
+                self.raw.clear();
+                self.raw_number = 0;
+                if on {
+                    self.pipeline.reset();
+                    self.record(RawItem::Start(self.sensor));
+                }
+                Some(Ok(()))
+            }
+            // A raw recording is computed again with one set of values.
+            Request::Write(_) if self.link.raw() => Some(Err(Refusal::NotNow)),
+            Request::Write(value) => {
+                self.keeping = Some(value);
+                None
+            }
+        }
+    }
+
+    fn record(&mut self, item: RawItem) {
+        let raw = Raw { number: self.raw_number, item };
+        self.raw_number = self.raw_number.wrapping_add(1);
+        if self.raw.push_back(raw).is_err() {
+            self.link.count_dropped_message();
+        }
+    }
+
+    /// A value that the board has to keep over a loss of power; [`Shoe::kept`] tells when it has.
+    pub fn keep(&self) -> Option<&Value> {
+        self.keeping.as_ref()
+    }
+
+    /// The board has kept the value, or could not. With a new value the tracker starts anew.
+    pub fn kept(&mut self, result: Result<(), Refusal>) {
+        let Some(value) = self.keeping.take() else { return };
+        if result.is_ok() {
+            match value {
+                Value::Parameters(parameters) => self.parameters = parameters,
+                Value::Calibration(calibration) => self.calibration = calibration,
+            }
+            self.pipeline = Pipeline::new(&self.sensor, &self.parameters, &self.calibration);
+        }
+        self.link.answer(result);
+    }
+
+    /// The board says how it is, about once in a second.
+    pub fn report(&mut self, now: Micros, health: &Health) {
+        let tracker = self.pipeline.tracker();
+        self.status = Some(Status {
+            time: now,
+            state: tracker.state(),
+            load: health.load,
+            lateness_us: health.lateness_us,
+            temperature: self.temperature.map(celsius),
+            battery: health.battery,
+            stack: health.stack,
+            reset: health.reset,
+            waiting: u16::try_from(self.link.waiting()).unwrap_or(u16::MAX),
+            accel: health.accel,
+            gyro: health.gyro,
+            tracker: *tracker.counters(),
+            link: self.link.counters(),
+        });
+    }
+
+    /// A line for the log; kept for a while when there is no laptop. The oldest gives way.
+    pub fn log(&mut self, time: Micros, level: Level, line: &str) {
+        if self.logs.is_full() {
+            self.logs.pop_front();
+            self.link.count_dropped_message();
+        }
+        // There is room now.
+        let _ = self.logs.push_back(Log { time, level, text: text(line) });
+    }
+
+    /// The next frame for the laptop: steps and answers first.
+    pub fn transmit<'a>(&mut self, now: Micros, buffer: &'a mut [u8; FRAME_MAX]) -> Option<&'a [u8]> {
+        match self.link.transmit(now, buffer).map(<[u8]>::len) {
+            Some(length) => buffer.get(..length),
+            None => frame::encode(&self.other()?, buffer).ok(),
+        }
+    }
+
+    fn other(&mut self) -> Option<FromShoe> {
+        if !self.link.connected() {
+            self.raw.clear();
+            (self.status, self.attitude) = (None, None);
+            return None;
+        }
+        None.or_else(|| self.logs.pop_front().map(FromShoe::Log))
+            .or_else(|| self.raw.pop_front().map(FromShoe::Raw))
+            .or_else(|| self.status.take().map(FromShoe::Status))
+            .or_else(|| self.attitude.take().map(FromShoe::Attitude))
+    }
+
+    /// When [`Shoe::transmit`] should be asked again if nothing happens before; a time that has passed means at once.
+    pub fn deadline(&self, now: Micros) -> Micros {
+        let pending = !self.logs.is_empty() || !self.raw.is_empty() || self.status.is_some() || self.attitude.is_some();
+        if pending && self.link.connected() { now } else { self.link.deadline(now) }
+    }
+
+    /// Since when the foot has not moved, by the clock of the samples; the board may save power then.
+    pub fn still_since(&self) -> Option<Micros> {
+        (self.pipeline.tracker().state() == State::Tracking).then_some(self.moved)
+    }
+
+    /// The board was asleep and the foot moves: what it did meanwhile is not known.
+    pub fn woken(&mut self, now: Micros) {
+        self.moved = now;
+        // The foot is on its way, so no rest will come first.
+        for order in [Order::Init, Order::Track] {
+            if self.pipeline.obey(order) && self.link.raw() {
+                self.record(RawItem::Order(order));
+            }
+        }
+    }
+
+    /// The tracker as it is.
+    pub fn tracker(&self) -> &Tracker {
+        self.pipeline.tracker()
+    }
+}
+
+fn attitude_of(sample: &ImuSample, output: &Output, tracker: &Tracker) -> Attitude {
+    let attitude = tracker.attitude();
+    Attitude {
+        time: sample.time,
+        state: output.state,
+        stance: output.stance,
+        attitude: [attitude.w, attitude.i, attitude.j, attitude.k],
+        displacement: tracker.displacement().into(),
+        velocity: tracker.velocity().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bmx055::{BATCH_FRAMES, Die};
+    use crate::selftest::{STRIDES, Walk};
+    use crate::step::FloorMode;
+    use crate::wire::frame::AnyDecoder;
+    use crate::wire::message::{Ack, Action, Command, LaptopHello, Outcome, ToShoe};
+    use crate::wire::packed::PackedStep;
+    use crate::wire::transfer::Item;
+    use crate::wire::{PROTOCOL, SCHEMA};
+    use std::vec::Vec;
+
+    /// The walk as both FIFOs would give it, 16 frames at a time.
+    fn batches() -> Vec<Batch> {
+        let config = Config::default();
+        let samples: Vec<ImuSample> = Walk::new(500).collect();
+        let counts = |value: nalgebra::Vector3<f32>, scale: f32| value.map(|value| libm::roundf(value / scale) as i16);
+        let mut batches = Vec::new();
+        for (at, chunk) in samples.chunks(BATCH_FRAMES / 2).enumerate() {
+            let stamp = chunk[chunk.len() - 1].time;
+            let batch = |die, frames| {
+                let sequence = (at * BATCH_FRAMES / 2) as u32;
+                Batch { die, sequence, stamp, lost: false, temperature: (die == Die::Accel).then_some(4), frames }
+            };
+            let accel = chunk.iter().map(|sample| counts(sample.accel.0, config.accel.scale()).into());
+            let gyro = chunk.iter().map(|sample| counts(sample.gyro.0, config.gyro.scale()).into());
+            batches.extend([batch(Die::Accel, accel.collect()), batch(Die::Gyro, gyro.collect())]);
+        }
+        batches
+    }
+
+    fn shoe() -> Shoe<64> {
+        let identity = Identity { boot: 9, firmware: "1.2.3", board: "none" };
+        Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default())
+    }
+
+    fn hear(shoe: &mut Shoe<64>, message: &ToShoe, now: Micros) {
+        shoe.received(frame::encode(message, &mut [0; FRAME_MAX]).unwrap(), now);
+    }
+
+    fn say(shoe: &mut Shoe<64>, now: Micros) -> Vec<FromShoe> {
+        let mut said = Vec::new();
+        let mut buffer = [0; FRAME_MAX];
+        while let Some(mut frame) = shoe.transmit(now, &mut buffer) {
+            said.push(AnyDecoder::new().next(&mut frame).unwrap().unwrap());
+        }
+        said
+    }
+
+    fn connected() -> Shoe<64> {
+        let mut shoe = shoe();
+        let hello = LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session: 1, software: text("test") };
+        hear(&mut shoe, &ToShoe::Hello(hello), Micros(0));
+        say(&mut shoe, Micros(0));
+        shoe
+    }
+
+    fn command(shoe: &mut Shoe<64>, number: u32, action: Action, now: Micros) {
+        hear(shoe, &ToShoe::Command(Command { session: 1, number, action }), now);
+    }
+
+    fn outcomes(said: &[FromShoe]) -> Vec<Outcome> {
+        let outcome = |message: &FromShoe| match message {
+            FromShoe::Reply(reply) => Some(reply.outcome.clone()),
+            _ => None,
+        };
+        said.iter().filter_map(outcome).collect()
+    }
+
+    /// All that is said; the laptop acknowledges each step.
+    fn listen(shoe: &mut Shoe<64>, now: Micros) -> Vec<FromShoe> {
+        let said = say(shoe, now);
+        for message in &said {
+            if let FromShoe::Step(sent) = message {
+                hear(shoe, &ToShoe::Ack(Ack { boot: sent.boot, next: sent.id + 1, later: 0 }), now);
+            }
+        }
+        said
+    }
+
+    fn walk(shoe: &mut Shoe<64>, mut between: impl FnMut(&mut Shoe<64>, usize, Micros)) -> Vec<FromShoe> {
+        let mut said = Vec::new();
+        for (at, batch) in batches().iter().enumerate() {
+            shoe.sensed(batch);
+            between(shoe, at, batch.stamp);
+            said.extend(listen(shoe, batch.stamp));
+        }
+        said
+    }
+
+    /// Writes a value in pieces, the first of them as command `number`.
+    fn write(shoe: &mut Shoe<64>, number: u32, item: Item, value: &Value) {
+        let mut offset = 0;
+        for number in number.. {
+            let piece = value.chunk(offset).unwrap();
+            offset += piece.bytes.len() as u16;
+            let last = offset == piece.total;
+            command(shoe, number, Action::Write(item, piece), Micros(1));
+            if last {
+                return;
+            }
+        }
+    }
+
+    fn steps(said: &[FromShoe]) -> Vec<PackedStep> {
+        let step = |message: &FromShoe| match message {
+            FromShoe::Step(sent) => Some(sent.step),
+            _ => None,
+        };
+        said.iter().filter_map(step).collect()
+    }
+
+    /// Computes the steps again from what was said.
+    fn again(said: &[FromShoe]) -> Vec<PackedStep> {
+        let mut pipeline = None;
+        let mut steps = Vec::new();
+        let items = said.iter().filter_map(|message| match message {
+            FromShoe::Raw(raw) => Some(raw),
+            _ => None,
+        });
+        for (raw, number) in items.zip(0..) {
+            assert_eq!(raw.number, number, "one was lost");
+            match &raw.item {
+                RawItem::Start(sensor) => {
+                    pipeline = Some(Pipeline::new(sensor, &Parameters::default(), &Calibration::default()));
+                }
+                RawItem::Order(order) => assert!(pipeline.as_mut().unwrap().obey(*order)),
+                RawItem::Batch(batch) => pipeline.as_mut().unwrap().push(batch, |_, output, _| {
+                    steps.extend(output.step.as_ref().map(PackedStep::pack));
+                }),
+            }
+        }
+        steps
+    }
+
+    #[test]
+    fn a_walk_arrives_as_steps_and_attitudes() {
+        let mut shoe = connected();
+        let said = walk(&mut shoe, |_, _, _| {});
+        // Of the stance at the end of the walk the shoe tells when the foot leaves it.
+        assert!(steps(&said).len() >= STRIDES, "{}", steps(&said).len());
+        let duration = batches().last().unwrap().stamp.as_seconds();
+        let attitudes = said.iter().filter(|message| matches!(message, FromShoe::Attitude(_))).count() as f64;
+        assert!((attitudes / duration - 20.0).abs() < 1.0, "{attitudes} in {duration} s");
+    }
+
+    #[test]
+    fn what_was_recorded_leads_to_the_same_bits() {
+        let mut shoe = connected();
+        let said = walk(&mut shoe, |shoe, at, now| match at {
+            // The walk has begun: the tracker starts anew.
+            900 => command(shoe, 1, Action::Raw(true), now),
+            2_500 => command(shoe, 2, Action::Order(Order::FloorMode(Some(FloorMode::Stairs))), now),
+            3_000 => command(shoe, 3, Action::Order(Order::Init), now),
+            _ => {}
+        });
+        assert_eq!(outcomes(&said), [Outcome::Done, Outcome::Done, Outcome::Done]);
+        let begun = said.iter().position(|message| matches!(message, FromShoe::Raw(_))).unwrap();
+        let recorded = again(&said);
+        assert_eq!(recorded, steps(&said[begun..]));
+        assert!(recorded.len() > STRIDES / 2 && recorded[0].unpack().index == 0, "{}", recorded.len());
+        let modes = recorded.iter().filter(|step| step.unpack().mode == FloorMode::Stairs).count();
+        assert!(modes > 3, "the order was obeyed");
+    }
+
+    #[test]
+    fn a_new_value_takes_effect_when_the_board_has_kept_it() {
+        let mut shoe = connected();
+        let mut new = Calibration::default();
+        new.accel.bias[2] = 0.5;
+        let value = Value::Calibration(new);
+        write(&mut shoe, 1, Item::Calibration, &value);
+        assert_eq!(shoe.keep(), Some(&value));
+        shoe.kept(Err(Refusal::Failed));
+        assert_eq!(outcomes(&say(&mut shoe, Micros(2))).last(), Some(&Outcome::Refused(Refusal::Failed)));
+        let read = |shoe: &mut Shoe<64>, number| {
+            command(shoe, number, Action::Read(Item::Calibration, 0), Micros(3));
+            outcomes(&say(shoe, Micros(3)))
+        };
+        assert_eq!(
+            read(&mut shoe, 100),
+            [Outcome::Piece(Value::Calibration(Calibration::default()).chunk(0).unwrap())]
+        );
+        write(&mut shoe, 101, Item::Calibration, &value);
+        shoe.kept(Ok(()));
+        assert_eq!(read(&mut shoe, 110), [Outcome::Piece(value.chunk(0).unwrap())]);
+    }
+
+    #[test]
+    fn values_stay_while_a_recording_runs() {
+        let mut shoe = connected();
+        command(&mut shoe, 1, Action::Raw(true), Micros(1));
+        write(&mut shoe, 2, Item::Parameters, &Value::Parameters(Parameters::documented()));
+        assert_eq!(outcomes(&say(&mut shoe, Micros(1))).last(), Some(&Outcome::Refused(Refusal::NotNow)));
+        assert!(shoe.keep().is_none());
+    }
+
+    #[test]
+    fn the_log_of_the_boot_waits_for_a_laptop() {
+        let mut shoe = shoe();
+        for line in 0..10 {
+            shoe.log(Micros(line), Level::Info, &std::format!("line {line}"));
+        }
+        shoe.report(Micros(20), &Health { stack: 1_234, ..Health::default() });
+        assert!(say(&mut shoe, Micros(20)).iter().all(|message| matches!(message, FromShoe::Hello(_))));
+        let hello = LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session: 1, software: text("test") };
+        hear(&mut shoe, &ToShoe::Hello(hello), Micros(30));
+        shoe.report(Micros(40), &Health { stack: 1_234, ..Health::default() });
+        assert_eq!(shoe.deadline(Micros(40)), Micros(40));
+        let said = say(&mut shoe, Micros(40));
+        let lines: Vec<_> = said.iter().filter(|message| matches!(message, FromShoe::Log(_))).collect();
+        assert!(matches!(lines[..], [FromShoe::Log(first), .., FromShoe::Log(last)]
+            if first.text == "line 2" && last.text == "line 9" && lines.len() == LOGS_WAITING));
+        assert!(said.iter().any(|message| matches!(message, FromShoe::Status(status) if status.stack == 1_234)));
+        assert!(shoe.deadline(Micros(40)) > Micros(40), "nothing is left");
+    }
+
+    #[test]
+    fn who_stands_still_may_sleep_and_wakes_in_motion() {
+        let mut shoe = connected();
+        assert_eq!(shoe.still_since(), None, "not before the tracker knows where it is");
+        let batches = batches();
+        // The walk begins with 3 s of rest.
+        for batch in batches.iter().take_while(|batch| batch.stamp < Micros(2_900_000)) {
+            shoe.sensed(batch);
+        }
+        assert!(shoe.still_since().is_some_and(|since| since < Micros(1_500_000)), "{:?}", shoe.still_since());
+        shoe.woken(Micros(2_900_000));
+        let late = batches.iter().filter(|batch| batch.stamp > Micros(4_200_000));
+        let mut said = Vec::new();
+        for batch in late {
+            shoe.sensed(batch);
+            said.extend(listen(&mut shoe, batch.stamp));
+        }
+        let steps: Vec<_> = steps(&said).iter().map(PackedStep::unpack).collect();
+        // Steps go on within two strides, the first of them marked.
+        let woken: Vec<_> = steps.iter().filter(|step| step.stance_end > Micros(4_200_000)).collect();
+        assert!(woken.len() > STRIDES - 5 && woken[0].quality.gap && !woken[2].quality.gap, "{}", woken.len());
+    }
+}
