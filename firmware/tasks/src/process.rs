@@ -1,0 +1,101 @@
+//! Makes steps of what was read, and talks to the laptop.
+
+use crate::traffic::Traffic;
+use crate::{instant, now};
+use embassy_futures::select::{Either4, select4};
+use embassy_time::{Duration, Ticker, Timer};
+use embedded_io_async::Read;
+use sohle_shared::shoe::{Health, Shoe};
+use sohle_shared::time::Micros;
+use sohle_shared::wire::frame::FRAME_MAX;
+use sohle_shared::wire::message::{Level, Refusal, ResetReason};
+use sohle_shared::wire::transfer::Value;
+
+/// While the line is full, it is asked again so often. **Units:** microseconds.
+const LINE_FULL_US: i64 = 2_000;
+
+/// What a board knows of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BoardHealth {
+    /// Time the processor was busy since the last question. **Units:** 1/1000.
+    pub load: u16,
+    /// **Units:** V.
+    pub battery: Option<f32>,
+    /// Largest depth of the stack since the boot. **Units:** bytes.
+    pub stack: u32,
+    /// Why the processor started.
+    pub reset: ResetReason,
+}
+
+/// What a board does for the loops.
+pub trait Board {
+    /// Keeps a value over a loss of power.
+    fn keep(&mut self, value: &Value) -> impl Future<Output = Result<(), Refusal>>;
+    /// How it is; asked once in a second.
+    fn health(&mut self) -> BoardHealth;
+    /// All loops live: the watchdog may be fed. Called once in a second.
+    fn alive(&mut self);
+}
+
+/// Makes steps, and talks to the laptop, for ever.
+pub async fn process<const STEPS: usize>(
+    traffic: &Traffic,
+    shoe: &mut Shoe<STEPS>,
+    mut line: impl Read,
+    mut board: impl Board,
+) -> ! {
+    let mut seconds = Ticker::every(Duration::from_secs(1));
+    let mut bytes = [0; 128];
+    let mut lateness = 0;
+    let (mut rounds, mut lost) = (traffic.rounds(), traffic.lost());
+    loop {
+        let due = transmit(traffic, shoe);
+        match select4(traffic.batches.receive(), line.read(&mut bytes), Timer::at(instant(due)), seconds.next()).await {
+            Either4::First(batch) => {
+                shoe.sensed(&batch);
+                lateness = lateness.max(now() - batch.stamp);
+            }
+            Either4::Second(Ok(length)) => shoe.received(bytes.get(..length).unwrap_or_default(), now()),
+            Either4::Second(Err(_)) => shoe.log(now(), Level::Warn, "serial line: bytes were lost"),
+            Either4::Third(()) => {}
+            Either4::Fourth(()) => {
+                let time = now();
+                shoe.report(time, &health(traffic, board.health(), lateness));
+                lateness = 0;
+                if traffic.lost() != lost {
+                    lost = traffic.lost();
+                    shoe.log(time, Level::Error, "the tracker was too late: samples were lost");
+                }
+                if traffic.rounds() != rounds {
+                    rounds = traffic.rounds();
+                    board.alive();
+                }
+            }
+        }
+        if let Some(value) = shoe.keep().copied() {
+            let result = board.keep(&value).await;
+            shoe.kept(result);
+        }
+    }
+}
+
+/// Fills the line; when to ask again.
+fn transmit<const STEPS: usize>(traffic: &Traffic, shoe: &mut Shoe<STEPS>) -> Micros {
+    let mut buffer = [0; FRAME_MAX];
+    loop {
+        let time = now();
+        if traffic.bytes.free_capacity() < FRAME_MAX {
+            return time + LINE_FULL_US;
+        }
+        let Some(frame) = shoe.transmit(time, &mut buffer) else { return shoe.deadline(time) };
+        // There is room: nobody else writes.
+        let _ = traffic.bytes.try_write(frame);
+    }
+}
+
+fn health(traffic: &Traffic, board: BoardHealth, lateness_us: i64) -> Health {
+    let [accel, gyro] = traffic.counters();
+    let BoardHealth { load, battery, stack, reset } = board;
+    let lateness_us = u32::try_from(lateness_us).unwrap_or(u32::MAX);
+    Health { load, lateness_us, battery, stack, reset, accel, gyro }
+}
