@@ -5,32 +5,41 @@ use cortex_m::register::msp;
 
 const PAINT: u32 = 0xc0de_face;
 
-/// Depth that is painted and searched. **Units:** bytes. Far more than any board has, far less than is free here.
-const DEPTH: u32 = 256 * 1024;
+/// Depth that is painted and searched. **Units:** bytes. As much as a board may have, far less than is free here.
+const DEPTH: u32 = 64 * 1024;
 
 /// Left unpainted for the frame of `paint` itself. **Units:** bytes.
 const MARGIN: u32 = 256;
 
-/// Words from `DEPTH` below the stack pointer up to just below it.
-fn words() -> impl Iterator<Item = *mut u32> {
-    let top = msp::read() & !3;
-    (top - DEPTH..top - MARGIN).step_by(4).map(|address| address as *mut u32)
+/// A stack that was painted.
+#[derive(Clone, Copy)]
+pub struct Painted {
+    /// Where it was painted from. Address.
+    top: u32,
+}
+
+impl Painted {
+    /// Words from `DEPTH` below the top up to just below it.
+    fn words(self) -> impl Iterator<Item = *mut u32> {
+        (self.top - DEPTH..self.top - MARGIN).step_by(4).map(|address| address as *mut u32)
+    }
+
+    /// How deep the stack has been below the place where it was painted. **Units:** bytes.
+    pub fn used(self) -> u32 {
+        // SAFETY: as in `paint`; reading what was painted there.
+        let intact = self.words().take_while(|&word| unsafe { ptr::read_volatile(word) } == PAINT).count() as u32;
+        DEPTH - 4 * intact
+    }
 }
 
 /// Paints the memory below the stack.
 #[inline(never)]
-pub fn paint() {
-    for word in words() {
+pub fn paint() -> Painted {
+    let painted = Painted { top: msp::read() & !3 };
+    for word in painted.words() {
         // SAFETY: the memory map leaves 4 MB between the statics and the start of the stack, which nothing else uses;
         // `MARGIN` keeps clear of the live frame, and no interrupt is enabled that would push another.
         unsafe { ptr::write_volatile(word, PAINT) }
     }
-}
-
-/// How deep the stack has been below this call since it was painted. **Units:** bytes.
-#[inline(never)]
-pub fn used() -> u32 {
-    // SAFETY: as in `paint`; reading what was painted there.
-    let intact = words().take_while(|&word| unsafe { ptr::read_volatile(word) } == PAINT).count() as u32;
-    DEPTH - 4 * intact
+    painted
 }

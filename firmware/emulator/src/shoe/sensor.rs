@@ -1,0 +1,175 @@
+//! The sensor that is not there: its twin, fed with the counts of a walk from a file on the host.
+
+use core::cell::RefCell;
+use cortex_m_semihosting::{nr, syscall};
+use embassy_time::Timer;
+use embedded_hal::digital::{Error, ErrorKind, ErrorType};
+use embedded_hal_async::digital::Wait;
+use sohle_shared::bmx055::Die;
+use sohle_shared::bmx055::counts::{HEADER_BYTES, Header, PAIR_BYTES, pair_from_bytes};
+use sohle_shared::bmx055::twin::SimulatedBmx055;
+use sohle_tasks::{instant, now};
+
+/// Pairs of frames that are fetched at once.
+const PAIRS: usize = 64;
+
+/// How long the foot stands still before the walk begins and after it has ended is the recording's affair; beyond its ends
+/// the first and the last pair are repeated.
+pub struct Walk {
+    file: usize,
+    header: Header,
+    readers: [Reader; 2],
+}
+
+/// The place of one die in the file.
+#[derive(Clone, Copy)]
+struct Reader {
+    die: Die,
+    period_ns: u64,
+    /// Number of the first pair in `bytes`.
+    first: u32,
+    bytes: [u8; PAIRS * PAIR_BYTES],
+    filled: bool,
+}
+
+impl Walk {
+    /// Opens the file that the emulator's command line names; `None` if there is no such walk.
+    pub fn open() -> Option<Self> {
+        let mut name = [0_u8; 512];
+        let length = command_line(&mut name)?;
+        // The first word stands for the program.
+        let begin = name.get(..length)?.iter().position(|&byte| byte == b' ')? + 1;
+        let file = open(name.get(begin..length)?)?;
+        let mut header = [0; HEADER_BYTES];
+        read(file, 0, &mut header)?;
+        let header = Header::from_bytes(&header).filter(|header| header.pairs > 0)?;
+        let reader = |die, period_ns: u32| Reader {
+            die,
+            period_ns: u64::from(period_ns),
+            first: 0,
+            bytes: [0; PAIRS * PAIR_BYTES],
+            filled: false,
+        };
+        let readers = [reader(Die::Accel, header.accel_period_ns), reader(Die::Gyro, header.gyro_period_ns)];
+        Some(Self { file, header, readers })
+    }
+
+    /// Periods of both dies.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// What the die reads at this time. **Units:** ns since the power came.
+    pub fn counts(&mut self, die: Die, time_ns: u64) -> [i16; 3] {
+        let last = self.header.pairs - 1;
+        let Some(reader) = self.readers.iter_mut().find(|reader| reader.die == die) else { return [0; 3] };
+        let pair = u32::try_from(time_ns / reader.period_ns).unwrap_or(last).min(last);
+        let missing = pair.checked_sub(reader.first).is_none_or(|at| at as usize >= PAIRS);
+        if missing || !reader.filled {
+            reader.first = pair;
+            let offset = HEADER_BYTES + pair as usize * PAIR_BYTES;
+            reader.filled = read(self.file, offset, &mut reader.bytes).is_some();
+        }
+        let at = (pair - reader.first) as usize * PAIR_BYTES;
+        let bytes = reader.bytes.get(at..).and_then(|rest| rest.first_chunk());
+        let (accel, gyro) = bytes.map_or(([0; 3], [0; 3]), pair_from_bytes);
+        match die {
+            Die::Accel => accel,
+            Die::Gyro => gyro,
+        }
+    }
+}
+
+/// Length of what the emulator was told as the program's arguments.
+fn command_line(buffer: &mut [u8]) -> Option<usize> {
+    let mut block = [buffer.as_mut_ptr() as usize, buffer.len()];
+    // SAFETY: the host writes at most so many bytes to the buffer, and the length to the block; both are alive.
+    let failed = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, block.as_mut_ptr() as usize) };
+    let [_, length] = block;
+    (failed == 0).then_some(length)
+}
+
+/// Opens a file of the host to be read; the name need not end in a zero.
+fn open(name: &[u8]) -> Option<usize> {
+    let mut text = [0_u8; 512];
+    text.get_mut(..name.len())?.copy_from_slice(name);
+    const READ_BINARY: usize = 1;
+    // SAFETY: the host reads so many bytes of the name, and the zero after them.
+    let file = unsafe { syscall!(OPEN, text.as_ptr(), READ_BINARY, name.len()) };
+    (file != usize::MAX).then_some(file)
+}
+
+/// Reads what is there from this place of the file on.
+fn read(file: usize, offset: usize, buffer: &mut [u8]) -> Option<()> {
+    // SAFETY: numbers only.
+    if unsafe { syscall!(SEEK, file, offset) } != 0 {
+        return None;
+    }
+    // SAFETY: the host writes at most so many bytes to the buffer.
+    let unread = unsafe { syscall!(READ, file, buffer.as_mut_ptr(), buffer.len()) };
+    (unread < buffer.len()).then_some(())
+}
+
+/// The pin that a die's watermark drives.
+pub struct Pin<S: 'static> {
+    twin: &'static RefCell<SimulatedBmx055<S>>,
+    die: Die,
+}
+
+impl<S> Pin<S> {
+    /// The pin of `die`.
+    pub fn new(twin: &'static RefCell<SimulatedBmx055<S>>, die: Die) -> Self {
+        Self { twin, die }
+    }
+}
+
+/// The twin was in use while its pin was looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct InUse;
+
+impl Error for InUse {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Other
+    }
+}
+
+impl<S> ErrorType for Pin<S> {
+    type Error = InUse;
+}
+
+impl<S: FnMut(Die, u64) -> [i16; 3]> Wait for Pin<S> {
+    async fn wait_for_high(&mut self) -> Result<(), InUse> {
+        loop {
+            let next = {
+                let mut twin = self.twin.try_borrow_mut().map_err(|_| InUse)?;
+                twin.advance_to(now());
+                if twin.take_interrupt(self.die).is_some() {
+                    return Ok(());
+                }
+                twin.next_interrupt(self.die)
+            };
+            match next {
+                Some(time) => Timer::at(instant(time)).await,
+                // None will come before somebody sets the die up.
+                None => core::future::pending().await,
+            }
+        }
+    }
+
+    async fn wait_for_low(&mut self) -> Result<(), InUse> {
+        // The pin is low whenever its interrupt was taken.
+        Ok(())
+    }
+
+    async fn wait_for_rising_edge(&mut self) -> Result<(), InUse> {
+        self.wait_for_high().await
+    }
+
+    async fn wait_for_falling_edge(&mut self) -> Result<(), InUse> {
+        Ok(())
+    }
+
+    async fn wait_for_any_edge(&mut self) -> Result<(), InUse> {
+        self.wait_for_high().await
+    }
+}
