@@ -1,4 +1,6 @@
-//! The tracker on an emulated Cortex-M4F: its bits must be the host's, and its cost is told.
+//! The shoe's code on an emulated Cortex-M4F: its bits must be the host's, and its cost within the budget.
+
+mod budget;
 
 use crate::cost::{self, Cost};
 use crate::process::{self, Failure, Said};
@@ -37,7 +39,9 @@ pub fn run() -> Result<(), Failure> {
     for line in lines(&emulated, "told ") {
         println!("  {line}");
     }
-    Ok(())
+    let (table, over) = budget::table(&lines(&emulated, "part "), &budget::read()?)?;
+    print!("{table}");
+    if over.is_empty() { Ok(()) } else { Err(Failure::Found(over.join("; "))) }
 }
 
 /// What the emulator counted: lines of setting, rate, phase, samples, instructions.

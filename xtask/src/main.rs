@@ -6,6 +6,7 @@ mod ci;
 mod cost;
 mod determinism;
 mod device;
+mod emulate;
 mod emulator;
 mod process;
 mod recordings;
@@ -32,6 +33,8 @@ enum Command {
     Device,
     /// Runs the tracker on an emulated Cortex-M4F: the bits must be the host's; prints its cost.
     Emulator,
+    /// Runs the shoe on an emulated Cortex-M4F that walks a recording; its serial line is a TCP port.
+    Emulate(emulate::Arguments),
     /// Counts the instructions of the documented and the default filter under callgrind.
     Bench,
     /// Evaluates in debug and release builds, on one and two threads: the outputs must be the same.
@@ -59,6 +62,7 @@ fn main() -> ExitCode {
         Command::Ci(arguments) => return if ci::run(&arguments) { ExitCode::SUCCESS } else { ExitCode::FAILURE },
         Command::Device => device::build_shared(),
         Command::Emulator => emulator::run(),
+        Command::Emulate(arguments) => emulate::run(&arguments),
         Command::Bench => bench::run(),
         Command::Determinism => determinism::run(),
         Command::Recordings(arguments) => recordings::run(&arguments),
