@@ -3,10 +3,16 @@
 //! [`session`] turns the bytes of a shoe into events and decides what is said to it; [`clock`] relates the shoe's time to
 //! the laptop's. Neither opens a port nor reads a clock: bytes and time are arguments, so that [`endurance`] can let hours
 //! pass in seconds over a [`line`](mod@line) as bad as it likes. The shoe's end is [`sohle_shared::wire::link`].
+//!
+//! [`transport`] keeps the port at an [`address`] open.
 
+pub mod address;
 pub mod clock;
 pub mod endurance;
 pub mod event;
 pub mod line;
 mod questions;
 pub mod session;
+pub mod transport;
+
+pub use address::Address;
