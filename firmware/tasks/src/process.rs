@@ -87,9 +87,11 @@ fn transmit<const STEPS: usize>(traffic: &Traffic, shoe: &mut Shoe<STEPS>) -> Mi
         if traffic.bytes.free_capacity() < FRAME_MAX {
             return time + LINE_FULL_US;
         }
-        let Some(frame) = shoe.transmit(time, &mut buffer) else { return shoe.deadline(time) };
-        // There is room: nobody else writes.
-        let _ = traffic.bytes.try_write(frame);
+        let Some(mut frame) = shoe.transmit(time, &mut buffer) else { return shoe.deadline(time) };
+        // There is room, since nobody else writes, but it may lie in two pieces.
+        while let Ok(written @ 1..) = traffic.bytes.try_write(frame) {
+            frame = frame.get(written..).unwrap_or_default();
+        }
     }
 }
 

@@ -20,9 +20,9 @@ use critical_section::Mutex;
 use embassy_executor::{InterruptExecutor, Spawner};
 use interrupt::Irq;
 use panic_semihosting as _;
-use sensor::{Pin, Walk};
+use sensor::{Bus, Pin, Walk};
 use sohle_shared::bmx055::blocking::Blocking;
-use sohle_shared::bmx055::twin::{Chip, SimulatedBmx055, SimulatedDelay, SimulatedDevice};
+use sohle_shared::bmx055::twin::{Chip, SimulatedBmx055, SimulatedDelay};
 use sohle_shared::bmx055::{Bmx055, Config, Die};
 use sohle_shared::calibration::Calibration;
 use sohle_shared::shoe::Shoe;
@@ -93,7 +93,7 @@ async fn start_sensing(accel_period_ns: u32, gyro_period_ns: u32) {
 
 #[embassy_executor::task]
 async fn sensing(twin: &'static RefCell<Twin>) {
-    let device = |chip| Blocking(SimulatedDevice::new(twin, chip));
+    let device = |chip| Blocking(Bus::new(twin, chip));
     let (accel, gyro) = (device(Chip::Die(Die::Accel)), device(Chip::Die(Die::Gyro)));
     let delay = Blocking(SimulatedDelay(twin));
     let driver = Bmx055::new(accel, gyro, device(Chip::Mag), delay, &Config::default());
@@ -116,7 +116,7 @@ async fn processing(line: uart::Receiver, stack: Painted) {
     // There is one boot: the line is new with every start of the emulator.
     let identity = Identity { boot: 1, firmware: env!("CARGO_PKG_VERSION"), board: "mps2-an386" };
     let (sensor, parameters, calibration) = (Config::default(), Parameters::default(), Calibration::default());
-    let shoe = SHOE.init(Shoe::new(identity, &sensor, &parameters, &calibration));
+    let shoe = SHOE.init_with(|| Shoe::new(identity, &sensor, &parameters, &calibration));
     process(&TRAFFIC, shoe, line, Machine { stack, asked: (0, 0) }).await
 }
 

@@ -4,10 +4,11 @@ use core::cell::RefCell;
 use cortex_m_semihosting::{nr, syscall};
 use embassy_time::Timer;
 use embedded_hal::digital::{Error, ErrorKind, ErrorType};
+use embedded_hal::spi::{self, Operation, SpiDevice};
 use embedded_hal_async::digital::Wait;
 use sohle_shared::bmx055::Die;
 use sohle_shared::bmx055::counts::{HEADER_BYTES, Header, PAIR_BYTES, pair_from_bytes};
-use sohle_shared::bmx055::twin::SimulatedBmx055;
+use sohle_shared::bmx055::twin::{BusFault, Chip, SimulatedBmx055, SimulatedDevice};
 use sohle_tasks::{instant, now};
 
 /// Pairs of frames that are fetched at once.
@@ -108,6 +109,30 @@ fn read(file: usize, offset: usize, buffer: &mut [u8]) -> Option<()> {
     // SAFETY: the host writes at most so many bytes to the buffer.
     let unread = unsafe { syscall!(READ, file, buffer.as_mut_ptr(), buffer.len()) };
     (unread < buffer.len()).then_some(())
+}
+
+/// The bus as one chip select sees it: time passes on the sensor as it does here.
+pub struct Bus<S: 'static> {
+    twin: &'static RefCell<SimulatedBmx055<S>>,
+    device: SimulatedDevice<'static, S>,
+}
+
+impl<S> Bus<S> {
+    /// The chip select of `chip`.
+    pub fn new(twin: &'static RefCell<SimulatedBmx055<S>>, chip: Chip) -> Self {
+        Self { twin, device: SimulatedDevice::new(twin, chip) }
+    }
+}
+
+impl<S> spi::ErrorType for Bus<S> {
+    type Error = BusFault;
+}
+
+impl<S: FnMut(Die, u64) -> [i16; 3]> SpiDevice for Bus<S> {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), BusFault> {
+        self.twin.try_borrow_mut().map_err(|_| BusFault)?.advance_to(now());
+        self.device.transaction(operations)
+    }
 }
 
 /// The pin that a die's watermark drives.

@@ -50,10 +50,11 @@ pub fn start() -> (Receiver, Sender) {
 
 /// A byte has come. Without room it is lost, as it would be on a line without handshake.
 pub fn on_received() {
+    // First: a byte that comes after the last look must raise it again.
+    write(CLEAR, 0b10);
     while read(STATE) & STATE_RECEIVED != 0 {
         let _ = RECEIVED.try_write(&[read(DATA) as u8]);
     }
-    write(CLEAR, 0b10);
 }
 
 /// The bytes of the laptop.
