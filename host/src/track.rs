@@ -49,6 +49,16 @@ pub struct Track {
 pub const PATH_PERIOD_US: i64 = 10_000;
 
 impl Track {
+    /// Puts steps end to end that were made elsewhere.
+    pub fn of_steps(steps: &[Step]) -> Self {
+        let mut track = Self::default();
+        for &step in steps {
+            track.span = Some((track.span.map_or(step.stance_start, |(first, _)| first), step.stance_end));
+            track.add(step);
+        }
+        track
+    }
+
     /// Feeds `samples` through a tracker.
     pub fn of(samples: impl IntoIterator<Item = ImuSample>, parameters: &Parameters) -> Self {
         let mut tracker = Tracker::new(parameters);

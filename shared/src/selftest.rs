@@ -5,6 +5,7 @@
 //!
 //! Everything comes from integers, polynomials and [`so3`]; nothing is stored but a table of strides.
 
+use crate::bmx055::{BATCH_FRAMES, Batch, Config, Die};
 use crate::sample::{ImuSample, STANDARD_GRAVITY_M_S2};
 use crate::so3;
 use crate::step::Step;
@@ -90,6 +91,58 @@ pub struct Walk {
     begun: Micros,
     mounting: UnitQuaternion<f32>,
     noise: Noise,
+}
+
+/// The walk as both FIFOs of a [BMX055](crate::bmx055) give it at 2 kHz, 16 frames at a time, its clocks without fault.
+pub struct Batches {
+    walk: Walk,
+    config: Config,
+    sequence: u32,
+    /// The gyroscope's batch that comes next.
+    waiting: Option<Batch>,
+}
+
+impl Batches {
+    /// From the start of the walk, with the default setting of the sensor.
+    pub fn new() -> Self {
+        Self { walk: Walk::new(500), config: Config::default(), sequence: 0, waiting: None }
+    }
+}
+
+impl Default for Batches {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Iterator for Batches {
+    type Item = Batch;
+
+    fn next(&mut self) -> Option<Batch> {
+        if let Some(gyro) = self.waiting.take() {
+            return Some(gyro);
+        }
+        let counts = |value: Vector3<f32>, scale: f32| value.map(|value| libm::roundf(value / scale) as i16).into();
+        let empty = |die, temperature| Batch {
+            die,
+            sequence: self.sequence,
+            stamp: Micros(0),
+            lost: false,
+            temperature,
+            frames: heapless::Vec::new(),
+        };
+        // 25 °C, as far as only the accelerometer knows.
+        let (mut accel, mut gyro) = (empty(Die::Accel, Some(4)), empty(Die::Gyro, None));
+        for sample in self.walk.by_ref().take(BATCH_FRAMES / 2) {
+            // Half of what a batch holds.
+            let _ = accel.frames.push(counts(sample.accel.0, self.config.accel.scale()));
+            let _ = gyro.frames.push(counts(sample.gyro.0, self.config.gyro.scale()));
+            (accel.stamp, gyro.stamp) = (sample.time, sample.time);
+        }
+        self.sequence += accel.frames.len() as u32;
+        self.waiting = Some(gyro).filter(|gyro| !gyro.frames.is_empty());
+        Some(accel).filter(|accel| !accel.frames.is_empty())
+    }
 }
 
 /// Motion of the foot at a moment.

@@ -12,6 +12,7 @@ pub mod endurance;
 mod error;
 pub mod evaluate;
 pub mod line;
+pub mod live;
 pub mod parameters;
 pub mod replay;
 pub mod report;
@@ -49,6 +50,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Endurance(endurance::Args),
     Line(line::Args),
+    Live(live::Args),
     Parameters(parameters::Args),
     Simulate(simulate::Args),
 }
@@ -87,6 +89,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Evaluate(args) => evaluate::run(args),
         Command::Endurance(args) => endurance::run(args),
         Command::Line(args) => line::run(args),
+        Command::Live(args) => live::run(args),
         Command::Parameters(args) => parameters::run(args),
         Command::Simulate(args) => simulate::run(args),
     }

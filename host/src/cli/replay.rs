@@ -1,7 +1,7 @@
 //! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
 
 use super::report::{Report, Settings};
-use super::{Error, Output, convert, parameters};
+use super::{Error, Output, convert, parameters, print};
 use crate::calibration;
 use crate::recording::{self, Profile};
 use std::path::PathBuf;
@@ -47,6 +47,12 @@ pub fn run(args: Args) -> Result<(), Error> {
     let calibration = calibration.as_deref().map(calibration::read).transpose()?;
     let profile = profile.map(|text| Profile::parse(&text)).transpose()?;
     let recording = recording::open(&file, profile.as_ref())?;
+    let again = recording.again;
+    if let Some(again) = &again
+        && !output.quiet
+    {
+        print(&format!("{again}\n"))?;
+    }
     let folder = output.folder(&stem(&file));
     Report {
         title: recording.name.clone(),
@@ -57,5 +63,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         origin: output.origin,
         quiet: output.quiet,
     }
-    .run()
+    .run()?;
+    match again {
+        Some(again) if !again.is_whole() => Err(Error::new(format!("computed again, the steps differ: {again}"))),
+        _ => Ok(()),
+    }
 }

@@ -126,7 +126,11 @@ fn outcome(recording: &Recording, calibration: Option<&Calibration>, settings: S
     let bar = progress(recording.samples.len() as u64, &format!("tracking ({})", settings.label), quiet);
     let begun = Instant::now();
     let correct = |sample: &ImuSample| calibration.map_or(*sample, |calibration| calibration.apply(sample, None));
-    let track = Track::of(recording.samples.iter().map(correct).progress_with(bar), &settings.parameters);
+    let track = if recording.samples.is_empty() {
+        Track::of_steps(&recording.steps)
+    } else {
+        Track::of(recording.samples.iter().map(correct).progress_with(bar), &settings.parameters)
+    };
     let taken = begun.elapsed();
     let metrics = recording.truth.as_ref().map(|truth| score(&track, &Truth::from(truth)));
     let placement = recording.truth.as_ref().map_or_else(Placement::default, |truth| placement(&track, truth));

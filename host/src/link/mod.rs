@@ -4,15 +4,19 @@
 //! the laptop's. Neither opens a port nor reads a clock: bytes and time are arguments, so that [`endurance`] can let hours
 //! pass in seconds over a [`line`](mod@line) as bad as it likes. The shoe's end is [`sohle_shared::wire::link`].
 //!
-//! [`transport`] keeps the port at an [`address`] open.
+//! [`transport`] keeps the port at an [`address`] open, [`connection`] puts session and port together, and [`recorder`]
+//! writes what is heard.
 
 pub mod address;
 pub mod clock;
+pub mod connection;
 pub mod endurance;
 pub mod event;
 pub mod line;
 mod questions;
+pub mod recorder;
 pub mod session;
 pub mod transport;
 
 pub use address::Address;
+pub use connection::Connection;

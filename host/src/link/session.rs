@@ -270,7 +270,7 @@ impl Session {
             say(&ToShoe::Command(command.clone()), out);
             self.command_due = now + COMMAND_US;
             self.tries += 1;
-            if self.tries % COMMAND_TRIES == 0 {
+            if self.tries.is_multiple_of(COMMAND_TRIES) {
                 self.ask_for_hello(now, HELLO_US);
             }
         }

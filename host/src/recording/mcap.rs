@@ -2,7 +2,7 @@
 //!
 //! # What is inside
 //! One channel for each kind of [message](super::message): `/imu`, and where known `/truth/pose`, `/truth/stance`,
-//! `/step`. Their schemas are `ros2msg` text, their messages CDR. The record of metadata `sohle` holds name, sensor
+//! `/step`; of a live walk also `/shoe`, which holds every [message of the shoe](super::heard). Their schemas are `ros2msg` text, their messages CDR. The record of metadata `sohle` holds name, sensor
 //! range and version; the record `about` whatever the writer had to say (parameters, seeds, origin). Nothing is
 //! compressed: the decoders of MCAP's compressions are C code.
 //!
@@ -14,9 +14,10 @@
 //! so no library is needed for it. The test `the_encoding_is_small` measures the sizes.
 
 use super::error::{Problem, RecordingError};
+use super::heard::Heard;
 use super::message::{Encoder, Message};
 use super::truth::{TruthPose, TruthStance};
-use super::{Recording, SensorRange, table};
+use super::{Recording, SensorRange, live, table};
 use mcap::records::{ChunkHeader, MessageHeader, Metadata, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, WriteOptions};
@@ -47,6 +48,8 @@ pub struct Writer {
     inner: Option<mcap::Writer<BufWriter<File>>>,
     part: PathBuf,
     target: PathBuf,
+    /// What was written is worth keeping though the end is missing.
+    live: bool,
     /// Channel of each schema and the number of messages on it.
     channels: BTreeMap<&'static str, (u16, u32)>,
     buffer: Encoder,
@@ -66,10 +69,35 @@ impl Writer {
         }
         let mut part = target.as_os_str().to_owned();
         part.push(".part");
-        let part = PathBuf::from(part);
+        Self::begin_at(PathBuf::from(part), target, name, range, about, false)
+    }
+
+    /// Begins the recording of something that happens now. It has its name from the start and stays if the writer is
+    /// dropped; what was written before the last [`Writer::flush`] can be read however it ends.
+    pub fn live(target: &Path, name: &str, about: &BTreeMap<String, String>) -> Result<Self, RecordingError> {
+        let mut about = about.clone();
+        about.insert(WIRE_SCHEMA.into(), wire_schema());
+        Self::begin_at(target.into(), target, name, SensorRange::default(), &about, true)
+    }
+
+    fn begin_at(
+        part: PathBuf,
+        target: &Path,
+        name: &str,
+        range: SensorRange,
+        about: &BTreeMap<String, String>,
+        live: bool,
+    ) -> Result<Self, RecordingError> {
+        let fail = |problem| RecordingError { path: target.into(), problem };
         let file = File::create(&part).map_err(|error| fail(error.into()))?;
-        let mut writer =
-            Self { inner: None, part, target: target.into(), channels: BTreeMap::new(), buffer: Encoder::default() };
+        let mut writer = Self {
+            inner: None,
+            part,
+            target: target.into(),
+            live,
+            channels: BTreeMap::new(),
+            buffer: Encoder::default(),
+        };
         let options = WriteOptions::new()
             .compression(None)
             .chunk_size(Some(CHUNK))
@@ -92,6 +120,29 @@ impl Writer {
         inner.write_metadata(&Metadata { name: ABOUT.into(), metadata: about.clone() })?;
         // Even a recording without samples is recognised as ours.
         self.channel::<ImuSample>().map(|_| ())
+    }
+
+    /// Adds to what was said about the recording when it began.
+    pub fn about(&mut self, about: &BTreeMap<String, String>) -> Result<(), RecordingError> {
+        self.whole(|inner| inner.write_metadata(&Metadata { name: ABOUT.into(), metadata: about.clone() }))
+    }
+
+    /// Appends a message of the shoe.
+    pub fn heard(&mut self, heard: &Heard) -> Result<(), RecordingError> {
+        self.message(heard)
+    }
+
+    /// Hands everything so far to the system.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.whole(mcap::Writer::flush)
+    }
+
+    fn whole(
+        &mut self,
+        work: impl FnOnce(&mut mcap::Writer<BufWriter<File>>) -> Result<(), McapError>,
+    ) -> Result<(), RecordingError> {
+        let done = self.inner.as_mut().ok_or(McapError::AttemptedWriteAfterFailure).and_then(work);
+        done.map_err(|error| RecordingError { path: self.target.clone(), problem: problem(error) })
     }
 
     /// Appends a sample.
@@ -126,7 +177,9 @@ impl Writer {
         file.sync_all()?;
         let size = file.metadata()?.len();
         drop(file);
-        fs::rename(&self.part, &self.target)?;
+        if !self.live {
+            fs::rename(&self.part, &self.target)?;
+        }
         self.part = PathBuf::new();
         Ok(size)
     }
@@ -162,7 +215,7 @@ impl Writer {
 impl Drop for Writer {
     fn drop(&mut self) {
         self.inner = None;
-        if !self.part.as_os_str().is_empty() {
+        if !self.live && !self.part.as_os_str().is_empty() {
             // Nobody is left to be told that the rest of a failed recording could not be removed.
             let _ = fs::remove_file(&self.part);
         }
@@ -207,6 +260,7 @@ enum Kind {
     Pose,
     Stance,
     Step,
+    Heard,
 }
 
 /// What has been read so far.
@@ -218,7 +272,15 @@ struct Contents {
     present: Vec<String>,
     library: String,
     has_samples: bool,
+    heard: Vec<Heard>,
     recording: Recording,
+}
+
+/// What tells which messages of the wire a recording holds.
+const WIRE_SCHEMA: &str = "wire_schema";
+
+fn wire_schema() -> String {
+    format!("{:016x}", sohle_shared::wire::SCHEMA)
 }
 
 /// Reads a recording of the project from the start of `source`.
@@ -226,6 +288,11 @@ pub(super) fn read(source: impl Read) -> Result<Recording, Problem> {
     let mut contents = Contents::default();
     match contents.fill(source) {
         Ok(()) => contents.finish(),
+        // A live walk whose program was killed has no end, but all that was flushed.
+        Err(Problem::Truncated(_)) if !contents.heard.is_empty() => {
+            contents.recording.metadata.insert("truncated".into(), "true".into());
+            contents.finish()
+        }
         Err(Problem::Truncated(_)) => Err(Problem::Truncated(contents.progress())),
         Err(other) => Err(other),
     }
@@ -315,6 +382,7 @@ impl Contents {
             TruthPose::SCHEMA => (Kind::Pose, TruthPose::DEFINITION),
             TruthStance::SCHEMA => (Kind::Stance, TruthStance::DEFINITION),
             Step::SCHEMA => (Kind::Step, Step::DEFINITION),
+            Heard::SCHEMA => (Kind::Heard, Heard::DEFINITION),
             _ => return Ok(None),
         };
         if definition != expected.as_bytes() || channel.message_encoding != MESSAGE_ENCODING {
@@ -332,6 +400,20 @@ impl Contents {
         match self.channels.get(&channel) {
             None => {}
             Some(Kind::Sample) => recording.samples.push(decode(bytes, recording.samples.len())?),
+            Some(Kind::Heard) => {
+                // Looked at before the bytes are taken for something that they are not.
+                let schema = recording.metadata.get(WIRE_SCHEMA);
+                if schema != Some(&wire_schema()) {
+                    return Err(Problem::Malformed(format!(
+                        "recorded with the messages {} of another version ('{}'), this program ({}) knows {}",
+                        schema.map_or("?", String::as_str),
+                        self.library,
+                        env!("CARGO_PKG_VERSION"),
+                        wire_schema()
+                    )));
+                }
+                self.heard.push(decode(bytes, self.heard.len())?);
+            }
             Some(Kind::Step) => recording.steps.push(decode(bytes, recording.steps.len())?),
             Some(Kind::Pose) => {
                 let poses = &mut recording.truth.get_or_insert_default().poses;
@@ -374,7 +456,10 @@ impl Contents {
             )));
         }
         let mut recording = self.recording;
-        if recording.samples.is_empty() {
+        if !self.heard.is_empty() {
+            live::compute(&self.heard, &mut recording)?;
+        }
+        if recording.samples.is_empty() && recording.steps.is_empty() {
             return Err(Problem::NoSamples(format!("no message on {}", ImuSample::TOPIC)));
         }
         let mut latest = None;
@@ -469,6 +554,7 @@ mod tests {
                 stances: vec![stance, stance],
             }),
             steps: vec![step(0), step(1)],
+            again: None,
             metadata: BTreeMap::from([("parameters".to_owned(), "gain = 0.1\n[stance]\n".to_owned())]),
         }
     }

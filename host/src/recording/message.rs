@@ -50,8 +50,15 @@ pub(super) trait Message: Sized {
 pub(super) struct Encoder(Vec<u8>);
 
 impl Encoder {
-    fn time(&mut self, time: Micros) {
+    pub(super) fn time(&mut self, time: Micros) {
         self.0.extend(time.0.to_le_bytes());
+    }
+
+    /// Bytes with their number before them; the number is aligned when only eights come before.
+    pub(super) fn sequence(&mut self, bytes: &[u8]) {
+        // A message of the wire is some hundred bytes long.
+        self.0.extend((bytes.len() as u32).to_le_bytes());
+        self.0.extend(bytes);
     }
 
     fn f64s(&mut self, values: &[f64]) {
@@ -70,14 +77,22 @@ impl Encoder {
 /// Takes the fields of a message one after the other; `None` when there are too few bytes.
 pub(super) struct Decoder<'a>(&'a [u8]);
 
-impl Decoder<'_> {
+impl<'a> Decoder<'a> {
+    /// As [`Encoder::sequence`] wrote it.
+    pub(super) fn sequence(&mut self) -> Option<&'a [u8]> {
+        let length = self.bytes().map(u32::from_le_bytes)?;
+        let (head, rest) = self.0.split_at_checked(usize::try_from(length).ok()?)?;
+        self.0 = rest;
+        Some(head)
+    }
+
     fn bytes<const N: usize>(&mut self) -> Option<[u8; N]> {
         let (head, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
         Some(*head)
     }
 
-    fn time(&mut self) -> Option<Micros> {
+    pub(super) fn time(&mut self) -> Option<Micros> {
         self.bytes().map(i64::from_le_bytes).map(Micros)
     }
 

@@ -10,7 +10,9 @@ pub mod error;
 #[cfg(test)]
 mod fuzz;
 mod gaitmap;
+pub mod heard;
 mod koroglu;
+pub mod live;
 pub mod mapping;
 pub mod mat;
 pub mod mcap;
@@ -76,6 +78,8 @@ pub struct Recording {
     pub truth: Option<SimulatedTruth>,
     /// Steps recorded with the samples; only from the project's own format.
     pub steps: Vec<Step>,
+    /// What came of computing a live walk again; only from the project's own format, and only if the shoe's counts are in it.
+    pub again: Option<live::Agreement>,
     /// What else is known: where it came from, parameters, seeds, versions.
     pub metadata: BTreeMap<String, String>,
     /// What is irregular about the samples.

@@ -261,8 +261,7 @@ fn attitude_of(sample: &ImuSample, output: &Output, tracker: &Tracker) -> Attitu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bmx055::{BATCH_FRAMES, Die};
-    use crate::selftest::{STRIDES, Walk};
+    use crate::selftest::{Batches, STRIDES};
     use crate::step::FloorMode;
     use crate::wire::frame::AnyDecoder;
     use crate::wire::message::{Ack, Action, Command, LaptopHello, Outcome, ToShoe};
@@ -271,23 +270,8 @@ mod tests {
     use crate::wire::{PROTOCOL, SCHEMA};
     use std::vec::Vec;
 
-    /// The walk as both FIFOs would give it, 16 frames at a time.
     fn batches() -> Vec<Batch> {
-        let config = Config::default();
-        let samples: Vec<ImuSample> = Walk::new(500).collect();
-        let counts = |value: nalgebra::Vector3<f32>, scale: f32| value.map(|value| libm::roundf(value / scale) as i16);
-        let mut batches = Vec::new();
-        for (at, chunk) in samples.chunks(BATCH_FRAMES / 2).enumerate() {
-            let stamp = chunk[chunk.len() - 1].time;
-            let batch = |die, frames| {
-                let sequence = (at * BATCH_FRAMES / 2) as u32;
-                Batch { die, sequence, stamp, lost: false, temperature: (die == Die::Accel).then_some(4), frames }
-            };
-            let accel = chunk.iter().map(|sample| counts(sample.accel.0, config.accel.scale()).into());
-            let gyro = chunk.iter().map(|sample| counts(sample.gyro.0, config.gyro.scale()).into());
-            batches.extend([batch(Die::Accel, accel.collect()), batch(Die::Gyro, gyro.collect())]);
-        }
-        batches
+        Batches::new().collect()
     }
 
     fn shoe() -> Shoe<64> {

@@ -1,0 +1,108 @@
+//! `sohle live` with a shoe in the same process: its application behind a network port, the sensor played back.
+
+use sohle_shared::bmx055::Config;
+use sohle_shared::calibration::Calibration;
+use sohle_shared::selftest::{Batches, STRIDES};
+use sohle_shared::shoe::Shoe;
+use sohle_shared::time::Micros;
+use sohle_shared::tracker::Parameters;
+use sohle_shared::wire::frame::FRAME_MAX;
+use sohle_shared::wire::link::Identity;
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+/// The walk takes 33 s; here it goes so much faster.
+const SPEED: i64 = 8;
+
+/// Walks for the laptops that come to `listener`, one after the other; the line is cut once, in the middle of the walk.
+fn walk(listener: &TcpListener) {
+    let identity = Identity { boot: 5, firmware: "test", board: "test" };
+    let mut shoe = Shoe::<256>::new(identity, &Config::default(), &Parameters::default(), &Calibration::default());
+    let mut line = accept(listener);
+    let begun = Instant::now();
+    let mut cut = false;
+    let mut batches = Batches::new().peekable();
+    let (mut buffer, mut bytes) = ([0; FRAME_MAX], [0; 256]);
+    // The walk begins when the laptop has had the time to ask for the counts.
+    let start = Micros(4_000_000);
+    let mut ended = None;
+    loop {
+        let now = Micros(begun.elapsed().as_micros() as i64 * SPEED);
+        while let Some(batch) = batches.next_if(|batch| batch.stamp + start.0 <= now) {
+            shoe.sensed(&batch);
+        }
+        if batches.peek().is_none() {
+            ended.get_or_insert(Instant::now());
+        }
+        if ended.is_some_and(|ended| ended.elapsed() > Duration::from_secs(20)) {
+            return;
+        }
+        if !cut && now > Micros(20_000_000) {
+            cut = true;
+            drop(line);
+            line = accept(listener);
+        }
+        match line.read(&mut bytes) {
+            Ok(0) => return,
+            Ok(count) => shoe.received(&bytes[..count], now),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(Duration::from_micros(500)),
+            Err(_) => return,
+        }
+        while let Some(frame) = shoe.transmit(now, &mut buffer) {
+            if line.write_all(frame).is_err() {
+                break;
+            }
+        }
+    }
+}
+
+fn accept(listener: &TcpListener) -> TcpStream {
+    let line = listener.accept().expect("the laptop connects").0;
+    line.set_nonblocking(true).expect("a socket can be");
+    line
+}
+
+fn sohle(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sohle")).args(arguments).output().expect("it was built")
+}
+
+#[test]
+fn a_live_walk_arrives_whole_is_recorded_and_leads_to_the_same_bits() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let shoe = std::thread::spawn(move || walk(&listener));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("live.mcap");
+    let (path, steps) = (path.to_str().unwrap(), STRIDES.to_string());
+    let address = format!("tcp:127.0.0.1:{port}");
+    let live = sohle(&["live", &address, "--out", path, "--raw", "--steps", &steps, "--for", "60", "--format", "json"]);
+    let (out, err) = (String::from_utf8_lossy(&live.stdout), String::from_utf8_lossy(&live.stderr));
+    assert!(live.status.success(), "{out}{err}");
+    let events: Vec<serde_json::Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let (summary, told) = events.split_last().unwrap();
+    assert_eq!((summary["steps"].as_u64(), summary["lost"].as_u64()), (Some(STRIDES as u64), Some(0)), "{err}");
+    assert!(told.iter().zip(0..).all(|(step, id)| step["id"] == id), "{out}");
+    assert!(err.contains("the port is closed"), "it was cut once: {err}");
+
+    let again = sohle(&["replay", path, "--out", folder.path().join("again").to_str().unwrap()]);
+    let (out, err) = (String::from_utf8_lossy(&again.stdout), String::from_utf8_lossy(&again.stderr));
+    assert!(again.status.success(), "{out}{err}");
+    // What went while the line was cut is missing among the counts, so the steps are computed up to there.
+    let line = out.lines().find(|line| line.contains("bit for bit")).unwrap();
+    let steps: Vec<usize> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+    assert!(steps[0] == steps[1] && steps[0] >= 5 && steps[2] == steps[3] && steps[2] > 50, "{line}");
+    drop(shoe);
+}
+
+#[test]
+fn where_no_shoe_is_it_says_so() {
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let live = sohle(&["live", &format!("tcp:127.0.0.1:{port}"), "--no-record", "--for", "0.6"]);
+    let err = String::from_utf8_lossy(&live.stderr);
+    assert!(!live.status.success() && err.ends_with("error: no shoe was found\n"), "{err}");
+    let wrong = sohle(&["live", "uart:/dev/ttyS0"]);
+    let err = String::from_utf8_lossy(&wrong.stderr);
+    assert!(!wrong.status.success() && err.contains("expected serial:/dev/ttyACM0"), "{err}");
+}
