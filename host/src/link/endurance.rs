@@ -22,6 +22,10 @@ use std::ops::Range;
 const STRIDE_US: f64 = 1_100_000.0;
 /// Length of the silence.
 const SILENCE_US: i64 = 600_000_000;
+/// Length of that before the program is started anew.
+const SHORT_SILENCE_US: i64 = 60_000_000;
+/// The program ends when fewer steps wait: half of what a minute brings.
+const HALF_FETCHED: usize = 28;
 /// How long the shoe or the program takes to start again.
 const START_US: i64 = 2_000_000;
 /// After the last step: enough to notice the end of a silence and to fetch what is missing.
@@ -44,7 +48,8 @@ pub enum Kind {
     Both,
     /// As [`Kind::Both`], with ten minutes of silence in the middle.
     Silence,
-    /// As [`Kind::Both`]; in the middle the laptop's program is started anew.
+    /// As [`Kind::Both`]; in the middle the laptop's program is started anew, while it fetches the steps of a minute of
+    /// silence.
     Restart,
     /// As [`Kind::Both`]; in the middle the shoe is.
     Reboot,
@@ -75,8 +80,11 @@ impl Kind {
             Self::Damaged => Faults { damage: 0.01, ..clean },
             Self::Lossy => Faults { loss: 0.1, ..clean },
             _ => {
-                let length = if self == Self::Silence { SILENCE_US } else { 0 };
-                let silence = middle..middle + length;
+                let silence = match self {
+                    Self::Silence => middle..middle + SILENCE_US,
+                    Self::Restart => middle + -SHORT_SILENCE_US..middle,
+                    _ => Micros(0)..Micros(0),
+                };
                 Faults { damage: 0.01, loss: 0.1, doubling: 0.05, overtaking: 0.05, silence, ..clean }
             }
         }
@@ -180,7 +188,8 @@ pub fn run(kind: Kind, steps: u32, seed: u64) -> Tally {
     let mut end = Micros(i64::MAX);
     while run.now < end {
         let now = run.now;
-        if fate.is_some_and(|fate| fate <= now) {
+        let ripe = kind == Kind::Reboot || run.shoe.link.waiting() < HALF_FETCHED;
+        if ripe && fate.is_some_and(|fate| fate <= now) {
             fate = None;
             if kind == Kind::Restart {
                 run.restart_program();
@@ -324,7 +333,7 @@ impl Run {
 }
 
 /// A step that nobody walked.
-fn step(index: u32, stance_end: Micros, random: &mut Random) -> Step {
+pub(super) fn step(index: u32, stance_end: Micros, random: &mut Random) -> Step {
     let vary = |random: &mut Random, size: f64| (size * random.symmetric()) as f32;
     let displacement = Vector3::new(1.3 + vary(random, 0.2), vary(random, 0.1), vary(random, 0.2));
     let sigmas = Vector4::from_fn(|_, _| 1e-4 + vary(random, 5e-5));

@@ -182,6 +182,7 @@ impl<const STEPS: usize> Link<STEPS> {
         if self.peer.as_ref().is_none_or(|peer| peer.session != hello.session) {
             self.peer = Some(Peer { session: hello.session, command: CommandState::None, reply_due: false });
             self.raw = false;
+            self.outbox.start_over(now);
         }
         self.outbox.resend_all(now);
     }

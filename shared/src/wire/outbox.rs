@@ -162,6 +162,12 @@ impl<const N: usize> Outbox<N> {
         }
     }
 
+    /// Another program listens: it does not have what came to the one before it ahead of the oldest, so that is due too.
+    pub fn start_over(&mut self, now: Micros) {
+        self.flights.iter_mut().for_each(|flight| flight.arrived = false);
+        self.resend_all(now);
+    }
+
     fn is_silent(&self, now: Micros) -> bool {
         now - self.heard > self.pace.silence_us
     }
@@ -321,6 +327,17 @@ mod tests {
         assert_eq!(sent(&mut outbox, &mut now, Micros(60_000)), [(30, 1)]);
         outbox.acknowledge(&ack(4, 0), now);
         assert!(outbox.is_empty());
+    }
+
+    #[test]
+    fn another_program_gets_what_the_one_before_had_ahead_of_the_oldest() {
+        let mut outbox = filled::<8>(3);
+        let mut now = Micros(0);
+        sent(&mut outbox, &mut now, Micros(30_000));
+        // 1 and 2 have come.
+        outbox.acknowledge(&ack(0, 0b11), now);
+        outbox.start_over(now);
+        assert_eq!(sent(&mut outbox, &mut now, Micros(60_000)), [(30, 0), (35, 1), (40, 2)]);
     }
 
     #[test]
