@@ -20,7 +20,7 @@ extern crate std;
 pub mod bmx055;
 pub mod calibration;
 #[cfg(any(feature = "wire", feature = "store"))]
-mod checksum;
+pub mod checksum;
 pub mod filter;
 pub mod preintegration;
 pub mod rest;
