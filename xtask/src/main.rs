@@ -8,6 +8,7 @@ mod determinism;
 mod device;
 mod emulate;
 mod emulator;
+mod firmware;
 mod process;
 mod recordings;
 mod stage;
@@ -35,6 +36,10 @@ enum Command {
     Emulator,
     /// Runs the shoe on an emulated Cortex-M4F that walks a recording; its serial line is a TCP port.
     Emulate(emulate::Arguments),
+    /// Builds the firmware of the boards; prints what it takes of flash and RAM, which must be within the budget.
+    Firmware(firmware::Arguments),
+    /// Puts the firmware onto a board with probe-rs and shows what it says.
+    Flash(firmware::FlashArguments),
     /// Counts the instructions of the documented and the default filter under callgrind.
     Bench,
     /// Evaluates in debug and release builds, on one and two threads: the outputs must be the same.
@@ -63,6 +68,8 @@ fn main() -> ExitCode {
         Command::Device => device::build_shared(),
         Command::Emulator => emulator::run(),
         Command::Emulate(arguments) => emulate::run(&arguments),
+        Command::Firmware(arguments) => firmware::run(&arguments),
+        Command::Flash(arguments) => firmware::flash(&arguments),
         Command::Bench => bench::run(),
         Command::Determinism => determinism::run(),
         Command::Recordings(arguments) => recordings::run(&arguments),

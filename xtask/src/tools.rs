@@ -59,7 +59,7 @@ pub fn missing(tools: &[&Tool]) -> Failure {
 }
 
 /// Where a program is; an absolute path stands for itself.
-fn on_path(name: &str) -> Option<PathBuf> {
+pub fn on_path(name: &str) -> Option<PathBuf> {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| path.exists())
 }

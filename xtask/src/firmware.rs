@@ -1,0 +1,260 @@
+//! The firmware of the real boards: built, held against its budget, put onto a board.
+
+use crate::device::{self, Route};
+use crate::process::{self, Failure};
+use crate::{in_root, tools};
+use clap::ValueEnum;
+use object::elf::{PT_LOAD, SHF_ALLOC};
+use object::read::elf::{ElfFile32, FileHeader, ProgramHeader, SectionHeader};
+use object::{Endianness, Object, ObjectSymbol};
+use serde::Deserialize;
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Where the firmware is.
+const FOLDER: &str = "firmware/shoe";
+
+/// Everything from here on is RAM, everything below flash (ARMv7-M Architecture Reference Manual, B3.1).
+const RAM: u64 = 0x2000_0000;
+
+/// A board that the firmware runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Board {
+    /// STM32WB55RG, worn on the shoe.
+    Wb55,
+    /// STM32F405RG, on the bench.
+    F405,
+}
+
+impl Board {
+    /// All of them.
+    const ALL: [Self; 2] = [Self::Wb55, Self::F405];
+
+    fn feature(self) -> &'static str {
+        match self {
+            Self::Wb55 => "board-wb55",
+            Self::F405 => "board-f405",
+        }
+    }
+
+    /// As probe-rs calls it.
+    fn chip(self) -> &'static str {
+        match self {
+            Self::Wb55 => "STM32WB55RGVx",
+            Self::F405 => "STM32F405RGTx",
+        }
+    }
+}
+
+/// Which boards to build for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Boards {
+    /// STM32WB55RG, worn on the shoe.
+    Wb55,
+    /// STM32F405RG, on the bench.
+    F405,
+    /// All of them.
+    #[default]
+    All,
+}
+
+/// What to build.
+#[derive(Default, clap::Args)]
+pub struct Arguments {
+    /// The board.
+    #[arg(long, value_enum, default_value_t)]
+    board: Boards,
+}
+
+/// What to put where.
+#[derive(clap::Args)]
+pub struct FlashArguments {
+    /// The board that is connected.
+    #[arg(long, value_enum, default_value = "wb55")]
+    board: Board,
+    /// The program: `shoe`, or one of `bringup_spi`, `bringup_fifo`, `bringup_uart`.
+    #[arg(long, default_value = "shoe")]
+    bin: String,
+}
+
+/// The most that the firmware may take. **Units:** bytes.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Budget {
+    flash: u64,
+    ram: u64,
+}
+
+/// What a program takes. **Units:** bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Size {
+    flash: u64,
+    statics: u64,
+    stack: u64,
+}
+
+impl Size {
+    fn ram(self) -> u64 {
+        self.statics + self.stack
+    }
+
+    /// What is over the budget, in words.
+    fn objection(self, budget: Budget) -> Option<String> {
+        let over = |what, is, most| (is > most).then(|| format!("{is} bytes of {what}, of {most}"));
+        over("flash", self.flash, budget.flash).or_else(|| over("RAM", self.ram(), budget.ram))
+    }
+}
+
+/// Builds all programs for the boards and holds `shoe` against the budget.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let boards = match arguments.board {
+        Boards::All => &Board::ALL[..],
+        Boards::Wb55 => &[Board::Wb55],
+        Boards::F405 => &[Board::F405],
+    };
+    let budget = read_budget(&in_root("firmware/budget.toml"))?;
+    let mut objections = Vec::new();
+    let mut rows = Vec::new();
+    for &board in boards {
+        build(board)?;
+        for name in programs()? {
+            let elf = device::binary(&name);
+            let size = size(&read(&elf)?).map_err(|trouble| Failure::Found(format!("{}: {trouble}", elf.display())))?;
+            if name == "shoe" {
+                objections.extend(size.objection(budget).map(|over| format!("{} for {board:?}: {over}", name)));
+            }
+            rows.push(row(&format!("{board:?}"), &name, [size.flash, size.statics, size.stack, size.ram()]));
+        }
+    }
+    println!("{:<6} {:<14} {:>9} {:>9} {:>9} {:>9}", "board", "bytes", "flash", "statics", "stack", "RAM");
+    rows.iter().for_each(|row| println!("{row}"));
+    println!("{:<6} {:<14} {:>9} {:>9} {:>9} {:>9}", "", "budget, shoe", budget.flash, "", "", budget.ram);
+    if objections.is_empty() { Ok(()) } else { Err(Failure::Found(objections.join("; "))) }
+}
+
+fn row(board: &str, program: &str, numbers: [u64; 4]) -> String {
+    let numbers: String = numbers.iter().map(|number| format!(" {number:>9}")).collect();
+    format!("{:<6} {program:<14}{numbers}", board.to_lowercase())
+}
+
+/// Puts a program onto the board that is connected, starts it and shows what it says.
+pub fn flash(arguments: &FlashArguments) -> Result<(), Failure> {
+    let names = programs()?;
+    if !names.contains(&arguments.bin) {
+        return Err(Failure::Found(format!("no program `{}`; there are {}", arguments.bin, names.join(", "))));
+    }
+    if tools::on_path("probe-rs").is_none() {
+        let how = "cargo install --locked probe-rs-tools (https://probe.rs)";
+        return Err(Failure::Missing { what: "probe-rs, which writes the flash".into(), how: how.into() });
+    }
+    build(arguments.board)?;
+    let mut command = Command::new("probe-rs");
+    process::run(command.args(["run", "--chip", arguments.board.chip()]).arg(device::binary(&arguments.bin)))
+}
+
+fn build(board: Board) -> Result<(), Failure> {
+    let mut command = Route::find()?.build(&in_root(FOLDER));
+    process::run(command.args(["--bins", "--features", board.feature()]))
+}
+
+/// The programs of the firmware: `shoe`, then one for each file in `src/bin`.
+fn programs() -> Result<Vec<String>, Failure> {
+    let folder = in_root(FOLDER).join("src/bin");
+    let failure = |source| Failure::File { path: folder.display().to_string(), source };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(&folder).map_err(failure)? {
+        let path: PathBuf = entry.map_err(failure)?.path();
+        names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
+    }
+    names.sort();
+    names.insert(0, "shoe".into());
+    Ok(names)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path).map_err(|source| Failure::File { path: path.display().to_string(), source })
+}
+
+fn read_budget(path: &Path) -> Result<Budget, Failure> {
+    let text = String::from_utf8_lossy(&read(path)?).into_owned();
+    toml::from_str(&text)
+        .map_err(|error| Failure::Found(format!("{}: {}", path.display(), error.message().replace('\n', " "))))
+}
+
+/// What the program in `elf` takes. An error when it is no such program, or when writing it would overwrite the store.
+fn size(elf: &[u8]) -> Result<Size, String> {
+    let file: ElfFile32<'_> = ElfFile32::parse(elf).map_err(|error| error.to_string())?;
+    let symbol = |name: &str| {
+        let found = file.symbols().find(|symbol| symbol.name() == Ok(name));
+        found.map(|symbol| symbol.address()).ok_or_else(|| format!("no symbol {name}"))
+    };
+    let endian = file.endian();
+    let store = symbol("_store_start")?..symbol("_store_end")?;
+    let flash = filled(loaded(&file, endian), &store)?;
+    let sections = file.elf_header().section_headers(endian, elf).map_err(|error| error.to_string())?;
+    let in_ram = |section: &&object::elf::SectionHeader32<Endianness>| {
+        section.sh_flags(endian) & SHF_ALLOC != 0 && u64::from(section.sh_addr(endian)) >= RAM
+    };
+    let statics = sections.iter().filter(in_ram).map(|section| u64::from(section.sh_size(endian))).sum();
+    let stack = symbol("_stack_start")?.saturating_sub(symbol("_stack_end")?);
+    Ok(Size { flash, statics, stack })
+}
+
+/// How much of the flash is written; an error when a part of the store is.
+fn filled(mut parts: impl Iterator<Item = Range<u64>>, store: &Range<u64>) -> Result<u64, String> {
+    parts.try_fold(0, |sum, part| {
+        if part.start < store.end && store.start < part.end {
+            let (part, store) = ((part.start, part.end), (store.start, store.end));
+            let of = |(start, end)| format!("{start:#x} to {end:#x}");
+            return Err(format!("it fills {}, but {} is the store", of(part), of(store)));
+        }
+        Ok(sum + (part.end - part.start))
+    })
+}
+
+/// What is written into the flash.
+fn loaded<'a>(file: &'a ElfFile32<'_>, endian: Endianness) -> impl Iterator<Item = Range<u64>> + 'a {
+    let all = file.elf_program_headers().iter().filter(move |segment| segment.p_type(endian) == PT_LOAD);
+    all.map(move |segment| {
+        let start = u64::from(segment.p_paddr(endian));
+        start..start + u64::from(segment.p_filesz(endian))
+    })
+    .filter(|range| !range.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_over_either_budget_is_named_with_its_size() {
+        let budget = Budget { flash: 100, ram: 50 };
+        let size = |flash, statics, stack| Size { flash, statics, stack };
+        assert_eq!(size(100, 40, 10).objection(budget), None);
+        assert_eq!(size(101, 1, 1).objection(budget).as_deref(), Some("101 bytes of flash, of 100"));
+        assert_eq!(size(1, 40, 11).objection(budget).as_deref(), Some("51 bytes of RAM, of 50"));
+    }
+
+    #[test]
+    fn a_program_goes_around_the_store_but_not_into_it() {
+        let store = 0x4000..0xc000;
+        let (vectors, program) = (0x0..0x188, 0xc000..0xd000);
+        assert_eq!(filled([vectors.clone(), program].into_iter(), &store), Ok(0x1188));
+        for part in [0x3ff0..0x4001, 0x5000..0x5001, 0xbfff..0xd000, 0x0..0x10_0000] {
+            assert!(filled([vectors.clone(), part].into_iter(), &store).is_err());
+        }
+    }
+
+    #[test]
+    fn the_budget_of_the_repository_is_read() {
+        let budget = read_budget(&in_root("firmware/budget.toml")).unwrap();
+        assert!(budget.flash > 0 && budget.ram > 0);
+    }
+
+    #[test]
+    fn what_is_no_program_has_no_size() {
+        assert!(size(b"\x7fELF").is_err());
+    }
+}
