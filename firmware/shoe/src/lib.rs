@@ -14,6 +14,8 @@ pub mod board;
 pub mod executor;
 mod fault;
 pub mod kept;
+pub mod line;
+pub mod settings;
 pub mod stack;
 
 use defmt_rtt as _;
