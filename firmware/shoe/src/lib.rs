@@ -15,6 +15,7 @@ pub mod executor;
 mod fault;
 pub mod kept;
 pub mod line;
+pub mod sensor;
 pub mod settings;
 pub mod stack;
 
