@@ -33,6 +33,7 @@ pub fn run(arguments: &Arguments) -> bool {
     run.stage("tests", tests);
     run.stage("documentation tests", || counted(cargo("test --locked --workspace --all-features --doc")));
     run.check("no_std build", device::build_shared);
+    run.check("firmware lint", firmware::lint);
     run.check("firmware", || firmware::run(&firmware::Arguments::default()));
     run.check("bits on a Cortex-M4F", emulator::run);
     run.check("cost", bench::run);

@@ -45,6 +45,15 @@ impl Route {
 
     /// `cargo build --release` for the target in `folder`, up to the point where packages and features are named.
     pub fn build(self, folder: &Path) -> Command {
+        self.cargo("build", folder)
+    }
+
+    /// `cargo clippy` in the same way; none when this machine's Rust for the target has no clippy.
+    pub fn clippy(self, folder: &Path) -> Option<Command> {
+        (self == Self::Installed || tools::DEBIAN_CLIPPY.present()).then(|| self.cargo("clippy", folder))
+    }
+
+    fn cargo(self, verb: &str, folder: &Path) -> Command {
         let mut command = match self {
             Self::Installed => process::cargo(),
             Self::Debian => {
@@ -54,13 +63,17 @@ impl Route {
                     command.env_remove(name);
                 }
                 command.env("RUSTC", "/usr/bin/rustc");
+                // Cargo looks there for what is behind `cargo clippy`.
+                let path = std::env::var_os("PATH").unwrap_or_default();
+                let folders = std::iter::once(PathBuf::from("/usr/bin")).chain(std::env::split_paths(&path));
+                command.env("PATH", std::env::join_paths(folders).unwrap_or_else(|_| path.clone()));
                 // Debian ships a stable compiler; building the core library is still behind a feature gate.
                 command.env("RUSTC_BOOTSTRAP", "1");
                 command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
                 command
             }
         };
-        command.current_dir(folder).args(["build", "--release", "--locked", "--target", TARGET]);
+        command.current_dir(folder).args([verb, "--release", "--locked", "--target", TARGET]);
         command.arg("--target-dir").arg(in_root(TARGET_FOLDER));
         if self == Self::Debian {
             command.arg("-Zbuild-std=core");

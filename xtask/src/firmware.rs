@@ -159,6 +159,18 @@ fn build(board: Board) -> Result<(), Failure> {
     process::run(command.args(["--bins", "--features", board.feature()]))
 }
 
+/// Lints the firmware for all boards, where there is a clippy for the target.
+pub fn lint() -> Result<(), Failure> {
+    for board in Board::ALL {
+        let Some(mut command) = Route::find()?.clippy(&in_root(FOLDER)) else {
+            println!("no clippy for {}: the firmware is not linted", device::TARGET);
+            return Ok(());
+        };
+        process::run(command.args(["--features", board.feature(), "--", "-D", "warnings"]))?;
+    }
+    Ok(())
+}
+
 /// The programs of the firmware: `shoe`, then one for each file in `src/bin`.
 fn programs() -> Result<Vec<String>, Failure> {
     let folder = in_root(FOLDER).join("src/bin");

@@ -31,11 +31,18 @@ pub const DEBIAN_RUST: Tool = Tool {
     packages: &["rustc-web", "cargo-web", "rust-web-src"],
 };
 
+/// Lints for the microcontroller, with the compiler above.
+pub const DEBIAN_CLIPPY: Tool = Tool {
+    what: "clippy of that Rust",
+    present_by: &["/usr/bin/cargo-clippy", "/usr/bin/clippy-driver"],
+    packages: &["rust-web-clippy"],
+};
+
 /// Linker for the microcontroller, with the compiler above.
 pub const LLD: Tool = Tool { what: "the linker lld", present_by: &["ld.lld"], packages: &["lld"] };
 
 /// Everything.
-pub const ALL: [Tool; 5] = [QEMU, VALGRIND, CURL, DEBIAN_RUST, LLD];
+pub const ALL: [Tool; 6] = [QEMU, VALGRIND, CURL, DEBIAN_RUST, DEBIAN_CLIPPY, LLD];
 
 impl Tool {
     /// Whether the machine has it.
@@ -67,7 +74,8 @@ pub fn on_path(name: &str) -> Option<PathBuf> {
 /// Installs what is missing of `tools` with apt-get, as root or through sudo.
 pub fn install(tools: &[Tool]) -> Result<(), Failure> {
     let target = crate::device::rustup_target_installed();
-    let needless = |tool: &Tool| target && (tool.what == DEBIAN_RUST.what || tool.what == LLD.what);
+    let instead = [DEBIAN_RUST.what, DEBIAN_CLIPPY.what, LLD.what];
+    let needless = |tool: &Tool| target && instead.contains(&tool.what);
     let absent: Vec<&Tool> = tools.iter().filter(|tool| !tool.present() && !needless(tool)).collect();
     if absent.is_empty() {
         println!("nothing to install");
