@@ -4,14 +4,13 @@
 
 use cortex_m_rt::entry;
 use embassy_executor::Spawner;
-use embassy_futures::select::{Either, select};
-use embassy_stm32::mode::Async;
+use embassy_futures::select::{Either3, select3};
 use embassy_stm32::peripherals::IWDG;
-use embassy_stm32::usart::UartTx;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Instant, Timer};
 use embedded_io_async::Read;
 use heapless::String;
+use sohle_shared::bmx055::Batch;
 use sohle_shared::time::Micros;
 use sohle_shared::tracker::State;
 use sohle_shared::wire::frame::{FRAME_MAX, encode};
@@ -19,7 +18,8 @@ use sohle_shared::wire::link::{Identity, Link, Request};
 use sohle_shared::wire::message::{FromShoe, Level, Log, Refusal, ResetReason, Status};
 use sohle_shared::wire::outbox::Pace;
 use sohle_shoe::executor::{self, Load};
-use sohle_shoe::line::Receiver;
+use sohle_shoe::line::{self, Receiver};
+use sohle_shoe::sensor::{self, now};
 use sohle_shoe::settings::Settings;
 use sohle_shoe::{board, kept, stack};
 use static_cell::StaticCell;
@@ -33,11 +33,6 @@ const STATUS_US: i64 = 1_000_000;
 /// 40 kB that must not be on the stack.
 static LINK: StaticCell<Link<STEPS>> = StaticCell::new();
 
-fn now() -> Micros {
-    // 2^63 microseconds are 292 000 years.
-    Micros(Instant::now().as_micros() as i64)
-}
-
 /// What the boot left to be told.
 struct Boot {
     words: Option<String<120>>,
@@ -45,31 +40,49 @@ struct Boot {
     number: u32,
 }
 
-/// The sending side, with the frame on its way.
-struct Sender {
-    tx: UartTx<'static, Async>,
-    frame: [u8; FRAME_MAX],
+/// When the line is full: until there is room for a frame again. **Units:** microseconds.
+const LINE_FULL_US: i64 = 4_000;
+
+/// How late the batches come through.
+#[derive(Default)]
+struct Lateness {
+    /// Longest since the last status. **Units:** microseconds.
+    longest_us: i64,
+    /// Of the sensor. **Units:** °C.
+    temperature: Option<f32>,
 }
 
-impl Sender {
-    async fn link(&mut self, link: &mut Link<STEPS>) {
-        while let Some(frame) = link.transmit(now(), &mut self.frame) {
-            // What does not arrive is sent again, or missed by nobody.
-            let _ = self.tx.write(frame).await;
-        }
+impl Lateness {
+    /// A batch is through.
+    fn count(&mut self, batch: &Batch) {
+        self.longest_us = self.longest_us.max(now() - batch.stamp);
+        self.temperature = batch.temperature.map(|half_kelvin| 23.0 + 0.5 * f32::from(half_kelvin));
     }
 
-    async fn message(&mut self, message: &FromShoe) {
-        if let Ok(frame) = encode(message, &mut self.frame) {
-            let _ = self.tx.write(frame).await;
-        }
+    /// The longest; counts anew.
+    fn take(&mut self) -> u32 {
+        core::mem::take(&mut self.longest_us).clamp(0, i64::from(u32::MAX)) as u32
+    }
+}
+
+/// Hands what the link has to say to the line. When to come again if that was not all.
+fn transmit(link: &mut Link<STEPS>, frame: &mut [u8; FRAME_MAX]) -> Option<Micros> {
+    while line::room() {
+        line::put(link.transmit(now(), frame)?);
+    }
+    Some(now() + LINE_FULL_US)
+}
+
+/// Hands a message to the line, unless it is busy.
+fn say(link: &mut Link<STEPS>, frame: &mut [u8; FRAME_MAX], message: &FromShoe) {
+    if !encode(message, frame).is_ok_and(line::put) {
+        link.count_dropped_message();
     }
 }
 
 #[embassy_executor::task]
 async fn serve(
     mut rx: Receiver,
-    tx: UartTx<'static, Async>,
     flash: board::Flash,
     mut watchdog: IndependentWatchdog<'static, IWDG>,
     mut boot: Boot,
@@ -78,17 +91,18 @@ async fn serve(
     let identity = Identity { boot: boot.number, firmware: env!("CARGO_PKG_VERSION"), board: board::NAME };
     let (parameters, calibration) = (settings.parameters(), settings.calibration());
     let link = LINK.init_with(|| Link::new(identity, &parameters, &calibration, Pace::default()));
-    let mut sender = Sender { tx, frame: [0; FRAME_MAX] };
     let mut load = Load::start();
     let mut status_due = now() + STATUS_US;
-    let mut chunk = [0; 256];
+    let mut line_due = None;
+    let mut late = Lateness::default();
+    let (mut chunk, mut frame) = ([0; 128], [0; FRAME_MAX]);
     watchdog.unleash();
     loop {
-        let due = link.deadline(now()).min(status_due).0.max(0) as u64;
-        let event = select(rx.read(&mut chunk), Timer::at(Instant::from_micros(due))).await;
-        watchdog.pet();
-        if let Either::First(Ok(count)) = event {
-            link.receive(&chunk[..count], now());
+        let due = line_due.unwrap_or_else(|| link.deadline(now())).min(status_due).0.max(0) as u64;
+        match select3(rx.read(&mut chunk), sensor::BATCHES.receive(), Timer::at(Instant::from_micros(due))).await {
+            Either3::First(Ok(count)) => link.receive(chunk.get(..count).unwrap_or_default(), now()),
+            Either3::Second(batch) => late.count(&batch),
+            Either3::Third(()) => {}
         }
         if let Some(request) = link.request() {
             let result = match &request {
@@ -97,34 +111,39 @@ async fn serve(
             };
             link.answer(result);
         }
-        sender.link(link).await;
+        line_due = transmit(link, &mut frame);
         if now() < status_due {
             continue;
         }
         status_due = now() + STATUS_US;
-        let load = load.take();
+        // This loop runs; if the sensor's does not, the watchdog starts both anew.
+        if sensor::alive() {
+            watchdog.pet();
+        }
+        let (load, lateness_us) = (load.take(), late.take());
         if !link.connected() {
             continue;
         }
         if let Some(text) = boot.words.take() {
-            sender.message(&FromShoe::Log(Log { time: now(), level: Level::Error, text })).await;
+            say(link, &mut frame, &FromShoe::Log(Log { time: now(), level: Level::Error, text }));
         }
+        let [accel, gyro] = sensor::counters();
         let status = Status {
             time: now(),
             state: State::Reset,
             load,
-            lateness_us: 0,
-            temperature: None,
+            lateness_us,
+            temperature: late.temperature,
             battery: None,
             stack: stack::used(),
             reset: boot.reset,
             waiting: link.waiting() as u16,
-            accel: Default::default(),
-            gyro: Default::default(),
+            accel,
+            gyro,
             tracker: Default::default(),
             link: link.counters(),
         };
-        sender.message(&FromShoe::Status(status)).await;
+        say(link, &mut frame, &FromShoe::Status(status));
     }
 }
 
@@ -138,8 +157,10 @@ fn main() -> ! {
         defmt::error!("before the reset: {=str}", words.as_str());
     }
     let boot = Boot { words, reset: board.reset, number: board.boot };
+    sensor::start(board::urgent(), board.sensor);
     executor::run(core.SCB, |spawner: Spawner| {
+        spawner.spawn(line::send(board.tx).expect("one line"));
         let rx = Receiver::new(board.rx);
-        spawner.spawn(serve(rx, board.tx, board.flash, board.watchdog, boot).expect("one task"));
+        spawner.spawn(serve(rx, board.flash, board.watchdog, boot).expect("one task"));
     })
 }

@@ -12,7 +12,7 @@ use sohle_shared::wire::transfer::Value;
 /// The store of this shoe.
 ///
 /// This flash does not wait, it blocks; so nothing here is async, and the records (a kilobyte each) are on the stack for a
-/// moment instead of in a task for ever.
+/// moment instead of in a task for ever. For the same reason they are not inlined into the task's own frame.
 ///
 /// While a page is erased the processor stands still and so do interrupts: 22 ms on the STM32WB55, up to 0.8 s on the
 /// STM32F405 (data sheets, typical and largest). The sensor's FIFOs run over and the line loses bytes; both are noticed and
@@ -21,6 +21,7 @@ pub struct Settings(Option<Store<Flash>>);
 
 impl Settings {
     /// Looks for what was kept. A flash that cannot be used leaves the defaults, and keeps nothing.
+    #[inline(never)]
     pub fn open(flash: Flash) -> Self {
         let store = block_on(Store::open(flash, board::store()));
         Self(store.inspect_err(|error| tell("the store does not open", error)).ok())
@@ -36,6 +37,7 @@ impl Settings {
         self.load()
     }
 
+    #[inline(never)]
     fn load<T: Stored + Default>(&mut self) -> T {
         let Some(store) = &mut self.0 else { return T::default() };
         let value = block_on(store.load()).inspect_err(|error| tell("a stored value is not used", error));
@@ -43,6 +45,7 @@ impl Settings {
     }
 
     /// Keeps a value; until that is done the one before is kept.
+    #[inline(never)]
     pub fn keep(&mut self, value: &Value) -> Result<(), Refusal> {
         let store = self.0.as_mut().ok_or(Refusal::Failed)?;
         let result = match value {
