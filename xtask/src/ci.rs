@@ -2,7 +2,7 @@
 
 use crate::process::{self, Failure};
 use crate::stage::{Run, Tally};
-use crate::{bench, check, determinism, device, emulator, firmware, tools};
+use crate::{bench, check, determinism, device, emulate, emulator, firmware, tools};
 use std::process::Command;
 
 /// How to run the checks.
@@ -36,6 +36,7 @@ pub fn run(arguments: &Arguments) -> bool {
     run.check("firmware lint", firmware::lint);
     run.check("firmware", || firmware::run(&firmware::Arguments::default()));
     run.check("bits on a Cortex-M4F", emulator::run);
+    run.check("the emulated shoe", emulate::check);
     run.check("cost", bench::run);
     run.check("determinism", determinism::run);
     run.summary()

@@ -1,9 +1,14 @@
 //! A live shoe without hardware: the firmware's loops on an emulated Cortex-M4F, its serial line a TCP port.
 
+mod proxy;
+
 use crate::process::{self, Failure};
 use crate::{device, in_root, tools};
+use proxy::Proxy;
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 /// Which walk the shoe takes, and where it is heard.
 #[derive(clap::Args)]
@@ -20,6 +25,10 @@ pub struct Arguments {
     /// Seed of the simulated walk
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Walks recordings and a simulated walk, and compares what the emulated processor computes with what this one does, bit
+    /// for bit; then a walk over a line that damages and loses, of which every step must arrive once
+    #[arg(long, conflicts_with_all = ["recording", "port"])]
+    check: bool,
     /// TCP port on this machine that is the shoe's serial line
     #[arg(long, default_value_t = 7_700)]
     port: u16,
@@ -27,10 +36,21 @@ pub struct Arguments {
 
 /// Virtual nanoseconds of an instruction, as a power of two: 62.5 million instructions in a second, about what a Cortex-M4F
 /// at 64 MHz executes.
-const SHIFT: &str = "shift=4,sleep=on";
+const SHIFT: &str = "shift=4,sleep=on,align=on";
+
+/// Recordings that are walked by the check, as far as they are here: name in the folder of recordings, layout, seconds.
+const RECORDINGS: [(&str, Option<&str>, u32); 2] =
+    [("foot_xio/short_walk.csv", None, 46), ("foot_gaitmap/imu_sample.csv", Some("gaitmap-left"), 45)];
+/// How long the simulated walk lasts in the check. **Units:** s.
+const SIMULATED_S: u32 = 40;
+/// A walk takes as long as it takes; this is for one that hangs.
+const LIMIT: Duration = Duration::from_secs(180);
 
 /// Runs the shoe until it is stopped.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.check {
+        return check();
+    }
     tools::QEMU.required()?;
     let sohle = process::build("dev", "--bin", "sohle")?;
     let folder = in_root("target/emulate");
@@ -56,7 +76,7 @@ pub fn build() -> Result<(), Failure> {
 pub fn simulated(sohle: &Path, folder: &Path, preset: &str, seed: u64) -> Result<PathBuf, Failure> {
     let walk = folder.join("simulated.mcap");
     let mut command = Command::new(sohle);
-    command.current_dir(crate::root()).args(["simulate", "--preset", preset, "--seed", &seed.to_string(), "--force"]);
+    command.current_dir(crate::root()).args(["simulate", "--preset", preset, "--seed", &seed.to_string()]);
     process::read(command.arg("--out").arg(&walk))?;
     Ok(walk)
 }
@@ -88,4 +108,129 @@ pub fn machine(port: u16, counts: &Path) -> Command {
 
 fn file(path: &Path, source: std::io::Error) -> Failure {
     Failure::File { path: path.display().to_string(), source }
+}
+
+/// The emulator while it runs.
+struct Running(Child);
+
+impl Running {
+    fn start(port: u16, counts: &Path) -> Result<Self, Failure> {
+        let mut command = machine(port, counts);
+        // It tells that it waits, and when this machine is too slow for real time.
+        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        child.map(Self).map_err(|source| Failure::NotStarted { program: "qemu-system-arm".into(), source })
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Killing fails only for a child that has just ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The part of the summary of `sohle live` that matters here.
+#[derive(serde::Deserialize)]
+struct Summary {
+    steps: u64,
+    lost: u64,
+    doubled: u64,
+    frames_bad: u64,
+    delay_median_ms: Option<f64>,
+    delay_max_ms: Option<f64>,
+    load: Option<u32>,
+    stack: Option<u32>,
+    waiting: Option<u32>,
+}
+
+/// The bits of the emulated processor against this one's, and a walk over a bad line.
+pub fn check() -> Result<(), Failure> {
+    tools::QEMU.required()?;
+    let sohle = process::build("dev", "--bin", "sohle")?;
+    build()?;
+    let folder = in_root("target/emulate");
+    std::fs::create_dir_all(&folder).map_err(|source| file(&folder, source))?;
+    let mut walks = Vec::new();
+    for (name, profile, seconds) in RECORDINGS {
+        let here = ["recordings", "../shared/recordings"].map(|folder| in_root(folder).join(name));
+        match here.into_iter().find(|path| path.is_file()) {
+            Some(path) => walks.push((name, path, profile, seconds)),
+            None => println!("{name} is not here and is skipped"),
+        }
+    }
+    walks.push(("a simulated walk", simulated(&sohle, &folder, "demo", 1)?, None, SIMULATED_S));
+
+    println!("walk                          steps  delay ms, median / longest  load 1/1000  stack");
+    for (name, walk, profile, seconds) in &walks {
+        let counts = converted(&sohle, &folder, walk, *profile)?;
+        let live = folder.join("live.mcap");
+        let port = free_port()?;
+        let running = Running::start(port, &counts)?;
+        let summary = live_walk(&sohle, port, *seconds, Some(&live))?;
+        drop(running);
+        row(name, &summary);
+        if summary.frames_bad > 0 || summary.steps == 0 {
+            return Err(Failure::Found(format!("{name}: {} steps, {} bad frames", summary.steps, summary.frames_bad)));
+        }
+        let again =
+            process::read(Command::new(&sohle).arg("replay").arg(&live).arg("--out").arg(folder.join("again")))?;
+        let told = again.out.lines().find(|line| line.contains("bit for bit"));
+        println!("  {}", told.ok_or_else(|| Failure::Found(format!("{name}: nothing was computed again")))?);
+    }
+    let (_, walk, profile, seconds) = &walks[0];
+    over_a_bad_line(&sohle, &converted(&sohle, &folder, walk, *profile)?, *seconds)
+}
+
+/// The first walk over a line that damages bytes and loses pieces, both ways: every step must arrive, once.
+fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<(), Failure> {
+    let (shoe, laptop) = (free_port()?, free_port()?);
+    let running = Running::start(shoe, counts)?;
+    let proxy =
+        Proxy::start(laptop, shoe).map_err(|source| Failure::NotStarted { program: "the bad line".into(), source })?;
+    let summary = live_walk(sohle, laptop, seconds + 5, None)?;
+    let (damaged, lost) = proxy.faults();
+    drop(running);
+    row("the first over a bad line", &summary);
+    println!("  the line damaged {damaged} bytes and lost {lost} pieces; {} frames were refused", summary.frames_bad);
+    let waiting = summary.waiting.unwrap_or(u32::MAX);
+    if summary.lost + summary.doubled + u64::from(waiting) > 0 || summary.steps == 0 || damaged == 0 || lost == 0 {
+        return Err(Failure::Found(format!(
+            "over a bad line {} steps came, {} were lost, {} came twice, {waiting} wait",
+            summary.steps, summary.lost, summary.doubled
+        )));
+    }
+    Ok(())
+}
+
+fn row(name: &str, summary: &Summary) {
+    let cell = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.1}"));
+    let number = |value: Option<u32>| value.map_or("-".into(), |value| value.to_string());
+    println!(
+        "{name:<30}{:>5} {:>18} / {:<8} {:>11} {:>6}",
+        summary.steps,
+        cell(summary.delay_median_ms),
+        cell(summary.delay_max_ms),
+        number(summary.load),
+        number(summary.stack)
+    );
+}
+
+/// `sohle live` for so long; with the sensor's counts if they are to be recorded.
+fn live_walk(sohle: &Path, port: u16, seconds: u32, record: Option<&Path>) -> Result<Summary, Failure> {
+    let mut command = Command::new(sohle);
+    command.args(["live", &format!("tcp:127.0.0.1:{port}"), "--for", &seconds.to_string(), "--format", "json", "-q"]);
+    match record {
+        Some(path) => command.arg("--raw").arg("--out").arg(path),
+        None => command.arg("--no-record"),
+    };
+    let said = process::read_within(&mut command, LIMIT)?;
+    let last = said.out.lines().last().unwrap_or_default();
+    serde_json::from_str(last).map_err(|error| Failure::Found(format!("sohle live said '{last}': {error}")))
+}
+
+/// A port that nobody listens on now.
+fn free_port() -> Result<u16, Failure> {
+    let listener = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
+    listener.map(|address| address.port()).map_err(|error| Failure::Found(format!("no free port: {error}")))
 }
