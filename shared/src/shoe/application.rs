@@ -64,6 +64,8 @@ pub struct Shoe<const STEPS: usize> {
 
 impl<const STEPS: usize> Shoe<STEPS> {
     /// A shoe that has just started, with what was kept of parameters and calibration.
+    // Built where it stays: 40 kB of steps are not to pass over the stack of a microcontroller more often than needed.
+    #[inline(always)]
     pub fn new(identity: Identity, sensor: &Config, parameters: &Parameters, calibration: &Calibration) -> Self {
         Self {
             sensor: *sensor,

@@ -104,6 +104,8 @@ pub struct Link<const STEPS: usize> {
 
 impl<const STEPS: usize> Link<STEPS> {
     /// Before the first byte. `parameters` and `calibration` are those in effect.
+    // Built where it stays: 40 kB of steps are not to pass over the stack of a microcontroller more often than needed.
+    #[inline(always)]
     pub fn new(identity: Identity, parameters: &Parameters, calibration: &Calibration, pace: Pace) -> Self {
         Self {
             identity,
