@@ -8,6 +8,7 @@ use sohle_shared::time::Micros;
 use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::frame::FRAME_MAX;
 use sohle_shared::wire::link::Identity;
+use sohle_shared::wire::outbox::{Outbox, Pace};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Command, Output};
@@ -19,7 +20,8 @@ const SPEED: i64 = 8;
 /// Walks for the laptops that come to `listener`, one after the other; the line is cut once, in the middle of the walk.
 fn walk(listener: &TcpListener) {
     let identity = Identity { boot: 5, firmware: "test", board: "test" };
-    let mut shoe = Shoe::<256>::new(identity, &Config::default(), &Parameters::default(), &Calibration::default());
+    let outbox = Outbox::<256>::new(0, Pace::default());
+    let mut shoe = Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default(), outbox);
     let mut line = accept(listener);
     let begun = Instant::now();
     let mut cut = false;

@@ -20,6 +20,7 @@ use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::frame::{AnyDecoder, FRAME_MAX, encode};
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Ack, FromShoe, LaptopHello, ToShoe, text};
+use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::{PROTOCOL, SCHEMA};
 
 /// The native rate. **Units:** microseconds.
@@ -192,7 +193,8 @@ const BOOT: u32 = 1;
 /// A shoe that a laptop listens to.
 fn connected(config: &Config) -> Shoe<64> {
     let identity = Identity { boot: BOOT, firmware: "0", board: "emulator" };
-    let mut shoe = Shoe::new(identity, config, &Parameters::default(), &Calibration::default());
+    let mut shoe =
+        Shoe::new(identity, config, &Parameters::default(), &Calibration::default(), Outbox::new(BOOT, Pace::SERIAL));
     let hello = LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session: 1, software: text("0") };
     hear(&mut shoe, &ToShoe::Hello(hello), Micros(0));
     shoe

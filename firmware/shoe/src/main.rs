@@ -16,13 +16,13 @@ use sohle_shared::tracker::State;
 use sohle_shared::wire::frame::{FRAME_MAX, encode};
 use sohle_shared::wire::link::{Identity, Link, Request};
 use sohle_shared::wire::message::{FromShoe, Level, Log, Refusal, ResetReason, Status};
-use sohle_shared::wire::outbox::Pace;
+use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shoe::executor::{self, Load};
 use sohle_shoe::line::{self, Receiver};
 use sohle_shoe::sensor::{self, now};
 use sohle_shoe::settings::Settings;
 use sohle_shoe::{board, kept, stack};
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 /// Steps that are kept until the laptop has them: more than half an hour of walking.
 const STEPS: usize = 1_000;
@@ -31,7 +31,12 @@ const STEPS: usize = 1_000;
 const STATUS_US: i64 = 1_000_000;
 
 /// 40 kB that must not be on the stack.
-static LINK: StaticCell<Link<STEPS>> = StaticCell::new();
+static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::new(0, Pace::SERIAL));
+
+/// The link with its steps elsewhere.
+type Wire = Link<STEPS, &'static mut Outbox<STEPS>>;
+
+static LINK: StaticCell<Wire> = StaticCell::new();
 
 /// What the boot left to be told.
 struct Boot {
@@ -66,7 +71,7 @@ impl Lateness {
 }
 
 /// Hands what the link has to say to the line. When to come again if that was not all.
-fn transmit(link: &mut Link<STEPS>, frame: &mut [u8; FRAME_MAX]) -> Option<Micros> {
+fn transmit(link: &mut Wire, frame: &mut [u8; FRAME_MAX]) -> Option<Micros> {
     while line::room() {
         line::put(link.transmit(now(), frame)?);
     }
@@ -74,7 +79,7 @@ fn transmit(link: &mut Link<STEPS>, frame: &mut [u8; FRAME_MAX]) -> Option<Micro
 }
 
 /// Hands a message to the line, unless it is busy.
-fn say(link: &mut Link<STEPS>, frame: &mut [u8; FRAME_MAX], message: &FromShoe) {
+fn say(link: &mut Wire, frame: &mut [u8; FRAME_MAX], message: &FromShoe) {
     if !encode(message, frame).is_ok_and(line::put) {
         link.count_dropped_message();
     }
@@ -90,7 +95,7 @@ async fn serve(
     let mut settings = Settings::open(flash);
     let identity = Identity { boot: boot.number, firmware: env!("CARGO_PKG_VERSION"), board: board::NAME };
     let (parameters, calibration) = (settings.parameters(), settings.calibration());
-    let link = LINK.init_with(|| Link::new(identity, &parameters, &calibration, Pace::default()));
+    let link = LINK.init_with(|| Link::new(identity, &parameters, &calibration, OUTBOX.take()));
     let mut load = Load::start();
     let mut status_due = now() + STATUS_US;
     let mut line_due = None;

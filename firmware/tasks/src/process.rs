@@ -2,6 +2,7 @@
 
 use crate::traffic::Traffic;
 use crate::{instant, now};
+use core::borrow::BorrowMut;
 use embassy_futures::select::{Either4, select4};
 use embassy_time::{Duration, Ticker, Timer};
 use embedded_io_async::Read;
@@ -9,6 +10,7 @@ use sohle_shared::shoe::{Health, Shoe};
 use sohle_shared::time::Micros;
 use sohle_shared::wire::frame::FRAME_MAX;
 use sohle_shared::wire::message::{Level, Refusal, ResetReason};
+use sohle_shared::wire::outbox::Outbox;
 use sohle_shared::wire::transfer::Value;
 
 /// While the line is full, it is asked again so often. **Units:** microseconds.
@@ -38,9 +40,9 @@ pub trait Board {
 }
 
 /// Makes steps, and talks to the laptop, for ever.
-pub async fn process<const STEPS: usize>(
+pub async fn process<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>>(
     traffic: &Traffic,
-    shoe: &mut Shoe<STEPS>,
+    shoe: &mut Shoe<STEPS, O>,
     mut line: impl Read,
     mut board: impl Board,
 ) -> ! {
@@ -80,7 +82,7 @@ pub async fn process<const STEPS: usize>(
 }
 
 /// Fills the line; when to ask again.
-fn transmit<const STEPS: usize>(traffic: &Traffic, shoe: &mut Shoe<STEPS>) -> Micros {
+fn transmit<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>>(traffic: &Traffic, shoe: &mut Shoe<STEPS, O>) -> Micros {
     let mut buffer = [0; FRAME_MAX];
     loop {
         let time = now();

@@ -13,7 +13,7 @@ use sohle_shared::time::Micros;
 use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::frame::FRAME_MAX;
 use sohle_shared::wire::link::{Identity, Link};
-use sohle_shared::wire::outbox::Pace;
+use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::packed::PackedStep;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -137,7 +137,8 @@ struct Shoe {
 impl Shoe {
     fn new(boot: u32, started: Micros) -> Self {
         let identity = Identity { boot, firmware: "endurance", board: "simulated" };
-        let link = Link::new(identity, &Parameters::default(), &Calibration::default(), Pace::default());
+        let link =
+            Link::new(identity, &Parameters::default(), &Calibration::default(), Outbox::new(boot, Pace::default()));
         Self { boot, link, started }
     }
 

@@ -333,7 +333,7 @@ mod tests {
     use sohle_shared::tracker::{Order, Parameters};
     use sohle_shared::wire::link::{Identity, Link, Request, ToShoeDecoder};
     use sohle_shared::wire::message::{Ack, Outcome, TimeReply};
-    use sohle_shared::wire::outbox::Pace;
+    use sohle_shared::wire::outbox::{Outbox, Pace};
 
     const SESSION: u32 = 77;
 
@@ -552,7 +552,8 @@ mod tests {
         let line = |purpose| Line::new(faults.clone(), Random::new(5, purpose));
         let (mut to_shoe, mut from_shoe) = (line(Purpose::ToShoe), line(Purpose::FromShoe));
         let identity = Identity { boot: 1, firmware: "1.2.3", board: "bench" };
-        let mut link: Link<4> = Link::new(identity, &Parameters::default(), &Calibration::default(), Pace::default());
+        let mut link: Link<4> =
+            Link::new(identity, &Parameters::default(), &Calibration::default(), Outbox::new(0, Pace::default()));
         let mut session = Session::new(SESSION, "0.9");
         let orders = [Order::Init, Order::Track, Order::Reset, Order::FloorMode(None)].repeat(10);
         let numbers: Vec<_> = orders.iter().map(|&order| session.command(Action::Order(order))).collect();

@@ -9,8 +9,9 @@ use crate::tracker::{Order, Output, Parameters, State, Tracker};
 use crate::wire::frame::{self, FRAME_MAX};
 use crate::wire::link::{Identity, Link, Request};
 use crate::wire::message::{Attitude, FromShoe, Level, Log, Raw, RawItem, Refusal, ResetReason, Status, text};
-use crate::wire::outbox::Pace;
+use crate::wire::outbox::Outbox;
 use crate::wire::transfer::Value;
+use core::borrow::BorrowMut;
 use heapless::Deque;
 
 /// Between two messages with the attitude. **Units:** microseconds.
@@ -40,14 +41,14 @@ pub struct Health {
     pub gyro: DieCounters,
 }
 
-/// The shoe, with room for `STEPS` steps that the laptop does not have yet.
+/// The shoe, with room for `STEPS` steps that the laptop does not have yet; they may lie elsewhere, as in [`Link`].
 #[derive(Debug)]
-pub struct Shoe<const STEPS: usize> {
+pub struct Shoe<const STEPS: usize, O = Outbox<STEPS>> {
     sensor: Config,
     parameters: Parameters,
     calibration: Calibration,
     pipeline: Pipeline,
-    link: Link<STEPS>,
+    link: Link<STEPS, O>,
     /// Number of the next raw message.
     raw_number: u32,
     raw: Deque<Raw, RAW_WAITING>,
@@ -62,17 +63,21 @@ pub struct Shoe<const STEPS: usize> {
     moved: Micros,
 }
 
-impl<const STEPS: usize> Shoe<STEPS> {
+impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     /// A shoe that has just started, with what was kept of parameters and calibration.
-    // Built where it stays: 40 kB of steps are not to pass over the stack of a microcontroller more often than needed.
-    #[inline(always)]
-    pub fn new(identity: Identity, sensor: &Config, parameters: &Parameters, calibration: &Calibration) -> Self {
+    pub fn new(
+        identity: Identity,
+        sensor: &Config,
+        parameters: &Parameters,
+        calibration: &Calibration,
+        outbox: O,
+    ) -> Self {
         Self {
             sensor: *sensor,
             parameters: *parameters,
             calibration: *calibration,
             pipeline: Pipeline::new(sensor, parameters, calibration),
-            link: Link::new(identity, parameters, calibration, Pace::default()),
+            link: Link::new(identity, parameters, calibration, outbox),
             raw_number: 0,
             raw: Deque::new(),
             logs: Deque::new(),
@@ -165,7 +170,7 @@ impl<const STEPS: usize> Shoe<STEPS> {
                 Value::Parameters(parameters) => self.parameters = parameters,
                 Value::Calibration(calibration) => self.calibration = calibration,
             }
-            self.pipeline = Pipeline::new(&self.sensor, &self.parameters, &self.calibration);
+            self.pipeline.restart(&self.sensor, &self.parameters, &self.calibration);
         }
         self.link.answer(result);
     }
@@ -267,6 +272,7 @@ mod tests {
     use crate::step::FloorMode;
     use crate::wire::frame::AnyDecoder;
     use crate::wire::message::{Ack, Action, Command, LaptopHello, Outcome, ToShoe};
+    use crate::wire::outbox::Pace;
     use crate::wire::packed::PackedStep;
     use crate::wire::transfer::Item;
     use crate::wire::{PROTOCOL, SCHEMA};
@@ -278,7 +284,13 @@ mod tests {
 
     fn shoe() -> Shoe<64> {
         let identity = Identity { boot: 9, firmware: "1.2.3", board: "none" };
-        Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default())
+        Shoe::new(
+            identity,
+            &Config::default(),
+            &Parameters::default(),
+            &Calibration::default(),
+            Outbox::new(0, Pace::default()),
+        )
     }
 
     fn hear(shoe: &mut Shoe<64>, message: &ToShoe, now: Micros) {

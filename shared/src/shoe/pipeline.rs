@@ -36,6 +36,15 @@ impl Pipeline {
         self.tracker.reset();
     }
 
+    /// As new, with other values.
+    // Apart, and one part after the other: built at once, in the frame of a loop, they would take 18 kB of its stack for ever.
+    #[inline(never)]
+    pub fn restart(&mut self, sensor: &Config, parameters: &Parameters, calibration: &Calibration) {
+        self.merger = Merger::new(sensor);
+        self.calibration = *calibration;
+        self.tracker = Tracker::new(parameters);
+    }
+
     /// Carries an order out; whether it could be.
     pub fn obey(&mut self, order: Order) -> bool {
         self.tracker.obey(order)

@@ -202,6 +202,8 @@ impl Tracker {
     }
 
     /// Back to RESET, as new. What a map commanded is forgotten too.
+    // Apart: in the frame of who calls it in a loop, the new one would take 13 kB of the stack for ever.
+    #[inline(never)]
     pub fn reset(&mut self) {
         *self = Self::new(&self.parameters);
     }

@@ -8,7 +8,7 @@ use super::frame::{self, Decoder, FRAME_MAX};
 use super::message::{
     Action, Command, FromShoe, Hello, LaptopHello, LinkCounters, Outcome, Refusal, Reply, TimeReply, ToShoe, text,
 };
-use super::outbox::{Outbox, Pace};
+use super::outbox::Outbox;
 use super::packed::PackedStep;
 use super::transfer::{self, Assembly, Item, Value};
 
@@ -17,6 +17,7 @@ use crate::calibration::Calibration;
 use crate::step::Step;
 use crate::time::Micros;
 use crate::tracker::{Order, Parameters};
+use core::borrow::BorrowMut;
 
 /// Between two hellos that nobody answers. **Units:** microseconds.
 const HELLO_US: i64 = 1_000_000;
@@ -86,14 +87,17 @@ impl CommandState {
 }
 
 /// The shoe's end of the wire, with room for `STEPS` steps.
+///
+/// They may lie elsewhere (`O` is then `&mut Outbox<STEPS>`): a thousand take 43 kB, which no microcontroller can afford to have
+/// on its stack while they are put in their place.
 #[derive(Debug)]
-pub struct Link<const STEPS: usize> {
+pub struct Link<const STEPS: usize, O = Outbox<STEPS>> {
     identity: Identity,
     parameters: Parameters,
     calibration: Calibration,
     assembly: Assembly,
     decoder: ToShoeDecoder,
-    outbox: Outbox<STEPS>,
+    outbox: O,
     peer: Option<Peer>,
     hello_due: Micros,
     /// A question for the time, and when it came.
@@ -102,18 +106,17 @@ pub struct Link<const STEPS: usize> {
     messages_dropped: u32,
 }
 
-impl<const STEPS: usize> Link<STEPS> {
-    /// Before the first byte. `parameters` and `calibration` are those in effect.
-    // Built where it stays: 40 kB of steps are not to pass over the stack of a microcontroller more often than needed.
-    #[inline(always)]
-    pub fn new(identity: Identity, parameters: &Parameters, calibration: &Calibration, pace: Pace) -> Self {
+impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
+    /// Before the first byte. `parameters` and `calibration` are those in effect, `outbox` is empty.
+    pub fn new(identity: Identity, parameters: &Parameters, calibration: &Calibration, mut outbox: O) -> Self {
+        outbox.borrow_mut().belong_to(identity.boot);
         Self {
             identity,
             parameters: *parameters,
             calibration: *calibration,
             assembly: Assembly::new(),
             decoder: ToShoeDecoder::new(),
-            outbox: Outbox::new(identity.boot, pace),
+            outbox,
             peer: None,
             hello_due: Micros(0),
             question: None,
@@ -124,7 +127,7 @@ impl<const STEPS: usize> Link<STEPS> {
 
     /// Keeps a step until the laptop has it.
     pub fn push(&mut self, step: &Step) {
-        self.outbox.push(PackedStep::pack(step));
+        self.outbox.borrow_mut().push(PackedStep::pack(step));
     }
 
     /// Whether a laptop with the same messages has said hello: only then other messages make sense.
@@ -139,15 +142,15 @@ impl<const STEPS: usize> Link<STEPS> {
 
     /// Steps that wait for their acknowledgement.
     pub fn waiting(&self) -> usize {
-        self.outbox.len()
+        self.outbox.borrow().len()
     }
 
     /// What was counted since the boot.
     pub fn counters(&self) -> LinkCounters {
         LinkCounters {
             frames: *self.decoder.counters(),
-            steps_resent: self.outbox.resent(),
-            steps_dropped: self.outbox.dropped(),
+            steps_resent: self.outbox.borrow().resent(),
+            steps_dropped: self.outbox.borrow().dropped(),
             messages_dropped: self.messages_dropped,
         }
     }
@@ -161,12 +164,12 @@ impl<const STEPS: usize> Link<STEPS> {
     pub fn receive(&mut self, mut bytes: &[u8], now: Micros) {
         while let Some(frame) = self.decoder.next(&mut bytes) {
             let Ok(message) = frame else { continue };
-            self.outbox.hear(now);
+            self.outbox.borrow_mut().hear(now);
             match message {
                 ToShoe::Hello(hello) => self.greet(&hello, now),
                 ToShoe::Ack(ack) => {
                     if ack.boot == self.identity.boot {
-                        self.outbox.acknowledge(&ack, now);
+                        self.outbox.borrow_mut().acknowledge(&ack, now);
                     }
                 }
                 ToShoe::TimeRequest(number) => self.question = Some((number, now)),
@@ -184,9 +187,9 @@ impl<const STEPS: usize> Link<STEPS> {
         if self.peer.as_ref().is_none_or(|peer| peer.session != hello.session) {
             self.peer = Some(Peer { session: hello.session, command: CommandState::None, reply_due: false });
             self.raw = false;
-            self.outbox.start_over(now);
+            self.outbox.borrow_mut().start_over(now);
         }
-        self.outbox.resend_all(now);
+        self.outbox.borrow_mut().resend_all(now);
     }
 
     fn command(&mut self, command: Command, now: Micros) {
@@ -218,7 +221,7 @@ impl<const STEPS: usize> Link<STEPS> {
                 tell(value.chunk(offset).map_or_else(Outcome::Refused, Outcome::Piece))
             }
             Action::Resend => {
-                self.outbox.resend_all(now);
+                self.outbox.borrow_mut().resend_all(now);
                 tell(Outcome::Done)
             }
         };
@@ -269,7 +272,7 @@ impl<const STEPS: usize> Link<STEPS> {
             peer.reply_due = false;
             return Some(FromShoe::Reply(Reply { session: peer.session, number: *number, outcome: outcome.clone() }));
         }
-        self.outbox.next(now).map(FromShoe::Step)
+        self.outbox.borrow_mut().next(now).map(FromShoe::Step)
     }
 
     fn hello(&self) -> Hello {
@@ -289,7 +292,7 @@ impl<const STEPS: usize> Link<STEPS> {
         if peer.reply_due || self.question.is_some() {
             return now;
         }
-        self.outbox.deadline(now).map_or(self.hello_due, |due| due.min(self.hello_due))
+        self.outbox.borrow().deadline(now).map_or(self.hello_due, |due| due.min(self.hello_due))
     }
 }
 
@@ -298,6 +301,7 @@ mod tests {
     use super::super::frame::AnyDecoder;
     use super::super::golden;
     use super::super::message::Ack;
+    use super::super::outbox::Pace;
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec;
@@ -306,7 +310,7 @@ mod tests {
 
     fn link() -> Link<16> {
         let identity = Identity { boot: 3, firmware: "1.2.3", board: "bench" };
-        Link::new(identity, &Parameters::default(), &Calibration::default(), Pace::default())
+        Link::new(identity, &Parameters::default(), &Calibration::default(), Outbox::new(0, Pace::default()))
     }
 
     fn hear(link: &mut Link<16>, message: &ToShoe, now: Micros) {

@@ -33,17 +33,21 @@ pub struct Pace {
     pub longest_probe_us: i64,
 }
 
-impl Default for Pace {
+impl Pace {
     /// For a serial line: 200 steps in a second are 12 % of 921 600 baud.
+    pub const SERIAL: Self = Self {
+        spacing_us: 5_000,
+        first_timeout_us: 250_000,
+        shortest_timeout_us: 50_000,
+        longest_timeout_us: 1_000_000,
+        silence_us: 3_000_000,
+        longest_probe_us: 8_000_000,
+    };
+}
+
+impl Default for Pace {
     fn default() -> Self {
-        Self {
-            spacing_us: 5_000,
-            first_timeout_us: 250_000,
-            shortest_timeout_us: 50_000,
-            longest_timeout_us: 1_000_000,
-            silence_us: 3_000_000,
-            longest_probe_us: 8_000_000,
-        }
+        Self::SERIAL
     }
 }
 
@@ -89,8 +93,6 @@ pub struct Outbox<const N: usize> {
 
 impl<const N: usize> Outbox<N> {
     /// Empty. `boot` goes out with each step.
-    // Built where it stays: 40 kB of steps are not to pass over the stack of a microcontroller more often than needed.
-    #[inline(always)]
     pub const fn new(boot: u32, pace: Pace) -> Self {
         const { assert!(N > 0) };
         Self {
@@ -108,6 +110,11 @@ impl<const N: usize> Outbox<N> {
             resent: 0,
             dropped: 0,
         }
+    }
+
+    /// The boot that the steps belong to from now on: it is not known yet when an empty outbox is made at compile time.
+    pub(super) fn belong_to(&mut self, boot: u32) {
+        self.boot = boot;
     }
 
     /// Keeps a step. When there is no room, the oldest gives way.

@@ -29,10 +29,11 @@ use sohle_shared::shoe::Shoe;
 use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Refusal, ResetReason};
+use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::transfer::Value;
 use sohle_tasks::{Board, BoardHealth, Traffic, process, send, sense};
 use stack::Painted;
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 /// Steps that the shoe keeps for the laptop.
 const STEPS: usize = 1_024;
@@ -110,14 +111,23 @@ async fn start_processing(stack: Painted) {
     spawner.spawn(sending(sent).expect("started once"));
 }
 
-#[embassy_executor::task]
-async fn processing(line: uart::Receiver, stack: Painted) {
-    static SHOE: StaticCell<Shoe<STEPS>> = StaticCell::new();
+/// The shoe with its steps elsewhere.
+type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS>>;
+
+/// Builds the shoe where it stays. Apart, so that what the building takes of the stack is free afterwards.
+#[inline(never)]
+fn build() -> &'static mut Wearer {
+    static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::new(0, Pace::SERIAL));
+    static SHOE: StaticCell<Wearer> = StaticCell::new();
     // There is one boot: the line is new with every start of the emulator.
     let identity = Identity { boot: 1, firmware: env!("CARGO_PKG_VERSION"), board: "mps2-an386" };
     let (sensor, parameters, calibration) = (Config::default(), Parameters::default(), Calibration::default());
-    let shoe = SHOE.init_with(|| Shoe::new(identity, &sensor, &parameters, &calibration));
-    process(&TRAFFIC, shoe, line, Machine { stack, asked: (0, 0) }).await
+    SHOE.init_with(|| Shoe::new(identity, &sensor, &parameters, &calibration, OUTBOX.take()))
+}
+
+#[embassy_executor::task]
+async fn processing(line: uart::Receiver, stack: Painted) {
+    process(&TRAFFIC, build(), line, Machine { stack, asked: (0, 0) }).await
 }
 
 #[embassy_executor::task]
