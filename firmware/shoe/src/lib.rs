@@ -14,7 +14,6 @@ pub mod board;
 pub mod executor;
 mod fault;
 pub mod kept;
-pub mod line;
 pub mod sensor;
 pub mod settings;
 pub mod stack;

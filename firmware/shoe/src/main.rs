@@ -1,171 +1,107 @@
-//! The program of the shoe: connects the parts of the board to the tasks.
+//! The program of the shoe: gives the parts of the board to the loops of `sohle-tasks`.
 #![no_std]
 #![no_main]
 
 use cortex_m_rt::entry;
 use embassy_executor::Spawner;
-use embassy_futures::select::{Either3, select3};
+use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::IWDG;
+use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_time::{Instant, Timer};
-use embedded_io_async::Read;
-use heapless::String;
-use sohle_shared::bmx055::Batch;
-use sohle_shared::time::Micros;
-use sohle_shared::tracker::State;
-use sohle_shared::wire::frame::{FRAME_MAX, encode};
-use sohle_shared::wire::link::{Identity, Link, Request};
-use sohle_shared::wire::message::{FromShoe, Level, Log, Refusal, ResetReason, Status};
+use sohle_shared::bmx055::Config;
+use sohle_shared::calibration::Calibration;
+use sohle_shared::shoe::Shoe;
+use sohle_shared::tracker::Parameters;
+use sohle_shared::wire::link::Identity;
+use sohle_shared::wire::message::{Level, Refusal, ResetReason};
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::transfer::Value;
 use sohle_shoe::executor::{self, Load};
-use sohle_shoe::line::{self, Receiver};
-use sohle_shoe::sensor::{self, now};
 use sohle_shoe::settings::Settings;
-use sohle_shoe::{board, kept, stack};
+use sohle_shoe::{board, kept, sensor, stack};
+use sohle_tasks::{Board, BoardHealth, Traffic, now, process, send};
 use static_cell::{ConstStaticCell, StaticCell};
 
-/// Steps that are kept until the laptop has them: more than half an hour of walking.
+/// Steps that are kept until the laptop has them: more than a quarter of an hour of walking.
 const STEPS: usize = 1_000;
 
-/// From one status to the next. **Units:** microseconds.
-const STATUS_US: i64 = 1_000_000;
+/// Bytes of the laptop that may wait: 11 ms of the line.
+const RING: usize = 1_024;
 
-/// 40 kB that must not be on the stack.
-static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::new(0, Pace::SERIAL));
+static TRAFFIC: Traffic = Traffic::new();
 
-/// The link with its steps elsewhere.
-type Wire = Link<STEPS, &'static mut Outbox<STEPS>>;
+/// 40 kB that are never on the stack.
+static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::blank());
 
-static LINK: StaticCell<Wire> = StaticCell::new();
+/// The shoe with its steps elsewhere.
+type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS>>;
 
-/// What the boot left to be told.
-struct Boot {
-    words: Option<String<120>>,
+/// What the loops need of the board.
+struct Machine {
+    settings: Settings,
+    watchdog: IndependentWatchdog<'static, IWDG>,
+    load: Load,
     reset: ResetReason,
-    number: u32,
 }
 
-/// When the line is full: until there is room for a frame again. **Units:** microseconds.
-const LINE_FULL_US: i64 = 4_000;
-
-/// How late the batches come through.
-#[derive(Default)]
-struct Lateness {
-    /// Longest since the last status. **Units:** microseconds.
-    longest_us: i64,
-    /// Of the sensor. **Units:** °C.
-    temperature: Option<f32>,
-}
-
-impl Lateness {
-    /// A batch is through.
-    fn count(&mut self, batch: &Batch) {
-        self.longest_us = self.longest_us.max(now() - batch.stamp);
-        self.temperature = batch.temperature.map(|half_kelvin| 23.0 + 0.5 * f32::from(half_kelvin));
+impl Board for Machine {
+    async fn keep(&mut self, value: &Value) -> Result<(), Refusal> {
+        self.settings.keep(value)
     }
 
-    /// The longest; counts anew.
-    fn take(&mut self) -> u32 {
-        core::mem::take(&mut self.longest_us).clamp(0, i64::from(u32::MAX)) as u32
+    fn health(&mut self) -> BoardHealth {
+        BoardHealth { load: self.load.take(), battery: None, stack: stack::used(), reset: self.reset }
     }
-}
 
-/// Hands what the link has to say to the line. When to come again if that was not all.
-fn transmit(link: &mut Wire, frame: &mut [u8; FRAME_MAX]) -> Option<Micros> {
-    while line::room() {
-        line::put(link.transmit(now(), frame)?);
-    }
-    Some(now() + LINE_FULL_US)
-}
-
-/// Hands a message to the line, unless it is busy.
-fn say(link: &mut Wire, frame: &mut [u8; FRAME_MAX], message: &FromShoe) {
-    if !encode(message, frame).is_ok_and(line::put) {
-        link.count_dropped_message();
+    fn alive(&mut self) {
+        self.watchdog.pet();
     }
 }
 
 #[embassy_executor::task]
-async fn serve(
-    mut rx: Receiver,
-    flash: board::Flash,
-    mut watchdog: IndependentWatchdog<'static, IWDG>,
-    mut boot: Boot,
-) {
-    let mut settings = Settings::open(flash);
-    let identity = Identity { boot: boot.number, firmware: env!("CARGO_PKG_VERSION"), board: board::NAME };
-    let (parameters, calibration) = (settings.parameters(), settings.calibration());
-    let link = LINK.init_with(|| Link::new(identity, &parameters, &calibration, OUTBOX.take()));
-    let mut load = Load::start();
-    let mut status_due = now() + STATUS_US;
-    let mut line_due = None;
-    let mut late = Lateness::default();
-    let (mut chunk, mut frame) = ([0; 128], [0; FRAME_MAX]);
-    watchdog.unleash();
-    loop {
-        let due = line_due.unwrap_or_else(|| link.deadline(now())).min(status_due).0.max(0) as u64;
-        match select3(rx.read(&mut chunk), sensor::BATCHES.receive(), Timer::at(Instant::from_micros(due))).await {
-            Either3::First(Ok(count)) => link.receive(chunk.get(..count).unwrap_or_default(), now()),
-            Either3::Second(batch) => late.count(&batch),
-            Either3::Third(()) => {}
-        }
-        if let Some(request) = link.request() {
-            let result = match &request {
-                Request::Write(value) => settings.keep(value),
-                Request::Order(_) | Request::Raw(_) => Err(Refusal::Unsupported),
-            };
-            link.answer(result);
-        }
-        line_due = transmit(link, &mut frame);
-        if now() < status_due {
-            continue;
-        }
-        status_due = now() + STATUS_US;
-        // This loop runs; if the sensor's does not, the watchdog starts both anew.
-        if sensor::alive() {
-            watchdog.pet();
-        }
-        let (load, lateness_us) = (load.take(), late.take());
-        if !link.connected() {
-            continue;
-        }
-        if let Some(text) = boot.words.take() {
-            say(link, &mut frame, &FromShoe::Log(Log { time: now(), level: Level::Error, text }));
-        }
-        let [accel, gyro] = sensor::counters();
-        let status = Status {
-            time: now(),
-            state: State::Reset,
-            load,
-            lateness_us,
-            temperature: late.temperature,
-            battery: None,
-            stack: stack::used(),
-            reset: boot.reset,
-            waiting: link.waiting() as u16,
-            accel,
-            gyro,
-            tracker: Default::default(),
-            link: link.counters(),
-        };
-        say(link, &mut frame, &FromShoe::Status(status));
-    }
+async fn processing(shoe: &'static mut Wearer, line: RingBufferedUartRx<'static>, machine: Machine) {
+    process(&TRAFFIC, shoe, line, machine).await
+}
+
+#[embassy_executor::task]
+async fn sending(line: UartTx<'static, Async>) {
+    send(&TRAFFIC, line).await
+}
+
+/// A shoe. Not inlined: like this the compiler makes it where the caller wants it, and not a second one beside it.
+#[inline(never)]
+fn make(identity: Identity, config: &Config, parameters: &Parameters, calibration: &Calibration) -> Wearer {
+    let outbox = OUTBOX.take();
+    outbox.begin(Pace::SERIAL);
+    Shoe::new(identity, config, parameters, calibration, outbox)
 }
 
 #[entry]
 fn main() -> ! {
+    static BUFFER: StaticCell<[u8; RING]> = StaticCell::new();
     let words = kept::take();
     let board = board::start();
     let core = cortex_m::Peripherals::take().expect("nobody took them before");
     defmt::info!("sohle {=str} on {=str}", env!("CARGO_PKG_VERSION"), board::NAME);
-    if let Some(words) = &words {
+
+    let mut settings = Settings::open(board.flash);
+    let (config, parameters, calibration) = (Config::default(), settings.parameters(), settings.calibration());
+    let identity = Identity { boot: board.boot, firmware: env!("CARGO_PKG_VERSION"), board: board::NAME };
+    let mut shoe = make(identity, &config, &parameters, &calibration);
+    if let Some(words) = words {
         defmt::error!("before the reset: {=str}", words.as_str());
+        shoe.log(now(), Level::Error, &words);
     }
-    let boot = Boot { words, reset: board.reset, number: board.boot };
-    sensor::start(board::urgent(), board.sensor);
+    let line = board.rx.into_ring_buffered(BUFFER.init([0; RING]));
+    let mut machine = Machine { settings, watchdog: board.watchdog, load: Load::start(), reset: board.reset };
+    machine.watchdog.unleash();
+    sensor::start(board.sensor, config, &TRAFFIC);
+    let shoe_at = &raw mut shoe;
+    // SAFETY: the executor never returns, so this frame and the shoe in it stay for ever, and this is the only reference. In a
+    // static it would have to be copied from a stack that is as large again.
+    let shoe: &'static mut Wearer = unsafe { &mut *shoe_at };
     executor::run(core.SCB, |spawner: Spawner| {
-        spawner.spawn(line::send(board.tx).expect("one line"));
-        let rx = Receiver::new(board.rx);
-        spawner.spawn(serve(rx, board.flash, board.watchdog, boot).expect("one task"));
+        spawner.spawn(sending(board.tx).expect("one line"));
+        spawner.spawn(processing(shoe, line, machine).expect("one shoe"));
     })
 }

@@ -49,8 +49,13 @@ impl Traffic {
         self.rounds.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// The next batch that was read, for who looks at them without a shoe.
+    pub async fn receive(&self) -> Batch {
+        self.batches.receive().await
+    }
+
     /// Of accelerometer and gyroscope.
-    pub(crate) fn counters(&self) -> [DieCounters; 2] {
+    pub fn counters(&self) -> [DieCounters; 2] {
         self.counters.lock(Cell::get)
     }
 
@@ -60,7 +65,7 @@ impl Traffic {
     }
 
     /// Batches lost because the queue was full.
-    pub(crate) fn lost(&self) -> u32 {
+    pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
 }

@@ -112,6 +112,24 @@ impl<const N: usize> Outbox<N> {
         }
     }
 
+    /// Empty, and nothing but zeros, so that a static takes no flash; [`Outbox::begin`] comes before anything else.
+    pub const fn blank() -> Self {
+        let none = Pace {
+            spacing_us: 0,
+            first_timeout_us: 0,
+            shortest_timeout_us: 0,
+            longest_timeout_us: 0,
+            silence_us: 0,
+            longest_probe_us: 0,
+        };
+        Self::new(0, none)
+    }
+
+    /// Sends at this pace from now on.
+    pub fn begin(&mut self, pace: Pace) {
+        (self.pace, self.probe_us) = (pace, pace.first_timeout_us);
+    }
+
     /// The boot that the steps belong to from now on: it is not known yet when an empty outbox is made at compile time.
     pub(super) fn belong_to(&mut self, boot: u32) {
         self.boot = boot;

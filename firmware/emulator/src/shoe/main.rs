@@ -117,12 +117,14 @@ type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS>>;
 /// Builds the shoe where it stays. Apart, so that what the building takes of the stack is free afterwards.
 #[inline(never)]
 fn build() -> &'static mut Wearer {
-    static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::new(0, Pace::SERIAL));
+    static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::blank());
     static SHOE: StaticCell<Wearer> = StaticCell::new();
     // There is one boot: the line is new with every start of the emulator.
     let identity = Identity { boot: 1, firmware: env!("CARGO_PKG_VERSION"), board: "mps2-an386" };
     let (sensor, parameters, calibration) = (Config::default(), Parameters::default(), Calibration::default());
-    SHOE.init_with(|| Shoe::new(identity, &sensor, &parameters, &calibration, OUTBOX.take()))
+    let outbox = OUTBOX.take();
+    outbox.begin(Pace::SERIAL);
+    SHOE.init_with(|| Shoe::new(identity, &sensor, &parameters, &calibration, outbox))
 }
 
 #[embassy_executor::task]

@@ -8,9 +8,12 @@ use cortex_m_rt::entry;
 use embassy_executor::Spawner;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Instant, Ticker};
-use sohle_shared::bmx055::{Batch, Die, DieCounters};
+use sohle_shared::bmx055::{Batch, Config, Die, DieCounters};
 use sohle_shoe::executor::{self, Load};
 use sohle_shoe::{board, sensor, stack};
+use sohle_tasks::{Traffic, now};
+
+static TRAFFIC: Traffic = Traffic::new();
 
 /// What came of one die since the line before.
 #[derive(Default)]
@@ -29,7 +32,7 @@ impl Second {
         self.frames += batch.frames.len() as u32;
         self.last = batch.frames.last().copied().unwrap_or_default();
         self.temperature = batch.temperature;
-        self.late_us = self.late_us.max(sensor::now() - batch.stamp);
+        self.late_us = self.late_us.max(now() - batch.stamp);
     }
 
     fn print(&self, name: &str, milliseconds: u64, counters: &DieCounters) {
@@ -69,7 +72,7 @@ async fn count() {
     let mut load = Load::start();
     let mut last = Instant::now();
     loop {
-        match select(sensor::BATCHES.receive(), second.next()).await {
+        match select(TRAFFIC.receive(), second.next()).await {
             Either::First(batch) => match batch.die {
                 Die::Accel => accel.count(&batch),
                 Die::Gyro => gyro.count(&batch),
@@ -77,10 +80,10 @@ async fn count() {
             Either::Second(()) => {
                 let milliseconds = last.elapsed().as_millis();
                 last = Instant::now();
-                let counters = sensor::counters();
+                let counters = TRAFFIC.counters();
                 core::mem::take(&mut accel).print("accelerometer", milliseconds, &counters[0]);
                 core::mem::take(&mut gyro).print("gyroscope", milliseconds, &counters[1]);
-                let (load, lost, stack) = (load.take(), sensor::lost(), stack::used());
+                let (load, lost, stack) = (load.take(), TRAFFIC.lost(), stack::used());
                 defmt::info!("load {=u16}/1000, {=u32} batches lost, {=u32} bytes of stack", load, lost, stack);
             }
         }
@@ -92,6 +95,6 @@ fn main() -> ! {
     let board = board::start();
     let core = cortex_m::Peripherals::take().expect("nobody took them before");
     defmt::info!("bringup_fifo on {=str}", board::NAME);
-    sensor::start(board::urgent(), board.sensor);
+    sensor::start(board.sensor, Config::default(), &TRAFFIC);
     executor::run(core.SCB, |spawner: Spawner| spawner.spawn(count().expect("one task")))
 }

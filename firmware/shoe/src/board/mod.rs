@@ -14,7 +14,7 @@ use core::ops::Range;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::flash::FLASH_BASE;
-use embassy_stm32::gpio::{Level, Output, Pin, Speed};
+use embassy_stm32::gpio::{Level, Output, Pin, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
@@ -94,5 +94,7 @@ fn spi_config() -> spi::Config {
 fn uart_config() -> usart::Config {
     let mut config = usart::Config::default();
     config.baudrate = 921_600;
+    // A line that is not connected is silent.
+    config.rx_pull = Pull::Up;
     config
 }
