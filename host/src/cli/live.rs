@@ -28,7 +28,8 @@ they are the same.\n\n\
 Examples:\n  sohle live serial:/dev/ttyACM0\n  sohle live tcp:127.0.0.1:7700 --raw --out walk.mcap"
 )]
 pub struct Args {
-    /// Where the shoe is: serial:PATH[@BAUD] or tcp:HOST:PORT
+    /// Where the shoe is: a serial port, at 921600 baud unless it says otherwise, or a network port
+    #[arg(value_name = "serial:PATH[@BAUD]|tcp:HOST:PORT")]
     address: Address,
     /// The recording [default: sohle-live-TIME.mcap]
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "no_record")]

@@ -45,7 +45,7 @@ pub enum Event {
     Log(Log),
     /// A command was answered.
     Reply {
-        /// As [`Session::command`] returned it.
+        /// As [`Session::command`](super::session::Session::command) returned it.
         number: u32,
         /// What became of it.
         outcome: Outcome,
