@@ -60,6 +60,35 @@ fn walk(listener: &TcpListener) {
     }
 }
 
+/// A shoe that stands and answers, laptop after laptop, until the process ends.
+fn stand(listener: &TcpListener) {
+    let identity = Identity { boot: 6, firmware: "test", board: "test" };
+    let outbox = Outbox::<4>::new(0, Pace::default());
+    let mut shoe = Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default(), outbox);
+    let begun = Instant::now();
+    loop {
+        let mut line = accept(listener);
+        let (mut buffer, mut bytes) = ([0; FRAME_MAX], [0; 256]);
+        loop {
+            let now = Micros(begun.elapsed().as_micros() as i64);
+            match line.read(&mut bytes) {
+                Ok(0) => break,
+                Ok(count) => shoe.received(&bytes[..count], now),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(Duration::from_millis(1)),
+                Err(_) => break,
+            }
+            if shoe.keep().is_some() {
+                shoe.kept(Ok(()));
+            }
+            while let Some(frame) = shoe.transmit(now, &mut buffer) {
+                if line.write_all(frame).is_err() {
+                    break;
+                }
+            }
+        }
+    }
+}
+
 fn accept(listener: &TcpListener) -> TcpStream {
     let line = listener.accept().expect("the laptop connects").0;
     line.set_nonblocking(true).expect("a socket can be");
@@ -107,4 +136,31 @@ fn where_no_shoe_is_it_says_so() {
     let wrong = sohle(&["live", "uart:/dev/ttyS0"]);
     let err = String::from_utf8_lossy(&wrong.stderr);
     assert!(!wrong.status.success() && err.contains("expected serial:/dev/ttyACM0"), "{err}");
+}
+
+#[test]
+fn a_shoe_does_what_it_is_asked_for() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp:127.0.0.1:{}", listener.local_addr().unwrap().port());
+    std::thread::spawn(move || stand(&listener));
+    let said = |arguments: &[&str]| {
+        let output = sohle(&[&["command", address.as_str()], arguments].concat());
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{arguments:?}: {err}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let defaults = String::from_utf8_lossy(&sohle(&["parameters"]).stdout).into_owned();
+    let value = |text: &str| toml::from_str::<toml::Table>(text).unwrap();
+    assert_eq!(value(&said(&["parameters", "get"])), value(&defaults));
+    for order in [&["reset"][..], &["init"], &["floor-mode", "stairs"], &["floor-mode", "auto"], &["resend"]] {
+        assert_eq!(said(order), "done\n");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mine = folder.path().join("mine.toml");
+    std::fs::write(&mine, "start_after_s = 7.5\n").unwrap();
+    assert_eq!(said(&["parameters", "set", mine.to_str().unwrap()]), "done\n");
+    assert_eq!(value(&said(&["parameters", "get"]))["start_after_s"].as_float(), Some(7.5));
+    std::fs::write(&mine, "shoe_size = 43\n").unwrap();
+    let refused = sohle(&["command", &address, "calibration", "set", mine.to_str().unwrap()]);
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("shoe_size"), "{refused:?}");
 }

@@ -1,31 +1,47 @@
 //! `sohle calibrate`: from a sensor that was laid down in twelve attitudes to its calibration and a verdict on it.
 
 use super::table::Table;
-use super::{Error, convert, print, progress};
+use super::{Error, command, convert, print, progress};
 use crate::calibration::{Conclusion, Line, Session};
 use crate::export::file;
 use crate::gravity::Place;
+use crate::link::address::AddressError;
+use crate::link::connection::Happening;
+use crate::link::event::Event;
+use crate::link::{Address, Connection};
 use crate::recording::{self, Profile, Recording};
 use crate::simulation::sensor::G_M_S2;
 use indicatif::ProgressIterator;
+use sohle_shared::bmx055::Merger;
 use sohle_shared::calibration::{Grade, Parameters};
+use sohle_shared::shoe::celsius;
+use sohle_shared::wire::message::{Action, RawItem};
+use sohle_shared::wire::transfer::Value;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-/// Finds the constants of a sensor from a recording of it at rest, and tells whether it is good enough
+/// How soon Ctrl-C is noticed.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Finds the constants of a sensor from it at rest, live or recorded, and tells whether it is good enough
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "How to record: let the sensor run for some minutes, then lay it down on a firm table for 4 seconds in each of\n\
+    after_help = "With a shoe in place of a recording it says what to do next, and the shoe keeps a calibration that is good enough.\n\n\
+How to record: let the sensor run for some minutes, then lay it down on a firm table for 4 seconds in each of\n\
 twelve attitudes, in any order, and let go of it each time: each of its six sides up, then leaning on six edges, halfway\n\
 between two sides (+x and +y, +x and -y, +x and +z, +x and -z, +y and +z, -y and +z up). A few degrees do not matter.\n\n\
 The exit code is 0 if the sensor is good or acceptable, and 1, with the reason in one line, if it is not or if too little\n\
 was shown. What could be computed is written all the same.\n\n\
-Examples:\n  sohle calibrate rests.mcap --out mine.toml --gravity-at 48.2,170\n  \
+Examples:\n  sohle calibrate serial:/dev/ttyACM0\n  sohle calibrate rests.mcap --out mine.toml --gravity-at 48.2,170\n  \
 sohle replay walk.mcap --calibration mine.toml\n  \
 sohle simulate --preset calibration --seed 3 --out rests.mcap; sohle calibrate rests.mcap"
 )]
 pub struct Args {
-    /// The recording of the rests
-    file: PathBuf,
+    /// The recording of the rests, or the shoe: a serial port or a network port
+    #[arg(value_name = "FILE|serial:PATH[@BAUD]|tcp:HOST:PORT")]
+    source: Source,
     /// How the file is laid out; recognised from the content when left out
     #[arg(long, value_name = "NAME|FILE.toml", long_help = convert::long_help())]
     profile: Option<String>,
@@ -43,6 +59,25 @@ pub struct Args {
     quiet: bool,
 }
 
+/// Where the samples come from.
+#[derive(Clone, Debug)]
+enum Source {
+    File(PathBuf),
+    Shoe(Address),
+}
+
+impl std::str::FromStr for Source {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        if text.starts_with("serial:") || text.starts_with("tcp:") {
+            text.parse().map(Self::Shoe)
+        } else {
+            Ok(Self::File(text.into()))
+        }
+    }
+}
+
 /// Gravity of some place on Earth, a mountain or a mine included.
 fn gravity(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value| (9.7..=9.9).contains(value));
@@ -51,18 +86,26 @@ fn gravity(text: &str) -> Result<f64, String> {
 
 /// Reads, calibrates, tells, writes.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args { file, profile, out, gravity, gravity_at, quiet } = args;
+    let Args { source, profile, out, gravity, gravity_at, quiet } = args;
     let profile = profile.map(|text| Profile::parse(&text)).transpose()?;
-    let recording = recording::open(&file, profile.as_ref())?;
     let gravity = gravity_at.map_or(gravity, |place| place.gravity());
-    let conclusion = calibrate(&recording, gravity, quiet)?;
+    let (name, shown, conclusion, connection) = match source {
+        Source::File(file) => {
+            let recording = recording::open(&file, profile.as_ref())?;
+            let name = file.file_stem().unwrap_or_default().to_owned();
+            (name, file.display().to_string(), calibrate(&recording, gravity, quiet)?, None)
+        }
+        Source::Shoe(address) => {
+            let mut connection = Connection::open(address);
+            let conclusion = live(&mut connection, gravity, quiet)?;
+            ("shoe".into(), "the shoe".into(), conclusion, Some(connection))
+        }
+    };
     if conclusion.is_computed() {
         if !quiet {
             print(&report(&conclusion, gravity))?;
         }
-        let out = out.unwrap_or_else(|| {
-            Path::new("sohle-out").join(file.file_stem().unwrap_or_default()).join("calibration.toml")
-        });
+        let out = out.unwrap_or_else(|| Path::new("sohle-out").join(&name).join("calibration.toml"));
         if let Some(folder) = out.parent() {
             file::folder(folder)?;
         }
@@ -71,9 +114,60 @@ pub fn run(args: Args) -> Result<(), Error> {
             print(&format!("Written to {}\n", out.display()))?;
         }
     }
-    match conclusion.fault() {
-        Some(fault) => Err(Error::new(format!("{}: {fault}", file.display()))),
-        None => Ok(()),
+    if let Some(fault) = conclusion.fault() {
+        return Err(Error::new(format!("{shown}: {fault}")));
+    }
+    if let Some(mut connection) = connection {
+        connection.write(&Value::Calibration(conclusion.calibration), &mut |_, _| {})?;
+        if !quiet {
+            print("The shoe keeps it.\n")?;
+        }
+    }
+    Ok(())
+}
+
+/// Leads a person through the attitudes by what the shoe shows, until all are there or Ctrl-C.
+fn live(connection: &mut Connection, gravity: f64, quiet: bool) -> Result<Conclusion, Error> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = stop.clone();
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
+    command::connect(connection)?;
+    let mut session = Session::new(&Parameters::default(), gravity);
+    let mut merger: Option<Merger> = None;
+    let mut fault = None;
+    let mut take = |happening: Happening| {
+        let Happening::Event(Event::Raw(raw)) = happening else { return };
+        let batch = match (raw.item, &mut merger) {
+            (RawItem::Start(sensor), merger) => {
+                *merger = Some(Merger::new(&sensor));
+                return;
+            }
+            (RawItem::Batch(batch), Some(_)) => batch,
+            _ => return,
+        };
+        let temperature = batch.temperature.map(celsius);
+        let Some(merger) = &mut merger else { return };
+        merger.push(&batch, |sample| {
+            for line in session.push(sample, temperature) {
+                if !quiet && let Err(error) = print(&format!("{line}\n")) {
+                    fault = Some(error);
+                }
+            }
+        });
+        if session.is_complete() {
+            stop.store(true, Ordering::Relaxed);
+        }
+    };
+    connection.ask(Action::Raw(true), &mut |happening, _| take(happening))?;
+    while !stop.load(Ordering::Relaxed) {
+        if let Some(happening) = connection.next(LOOK) {
+            take(happening);
+        }
+    }
+    connection.ask(Action::Raw(false), &mut |_, _| {})?;
+    match fault {
+        Some(error) => Err(error),
+        None => Ok(session.conclusion()),
     }
 }
 

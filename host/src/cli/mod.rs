@@ -6,6 +6,7 @@
 //! was wrong).
 
 pub mod calibrate;
+pub mod command;
 pub mod convert;
 pub mod demo;
 pub mod endurance;
@@ -51,6 +52,8 @@ enum Command {
     Endurance(endurance::Args),
     Line(line::Args),
     Live(live::Args),
+    #[command(name = "command")]
+    Ask(command::Args),
     Parameters(parameters::Args),
     Simulate(simulate::Args),
 }
@@ -90,6 +93,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Endurance(args) => endurance::run(args),
         Command::Line(args) => line::run(args),
         Command::Live(args) => live::run(args),
+        Command::Ask(args) => command::run(args),
         Command::Parameters(args) => parameters::run(args),
         Command::Simulate(args) => simulate::run(args),
     }
