@@ -2,9 +2,10 @@
 //!
 //! # What is inside
 //! One channel for each kind of [message](super::message): `/imu`, and where known `/truth/pose`, `/truth/stance`,
-//! `/step`; of a live walk also `/shoe`, which holds every [message of the shoe](super::heard). Their schemas are `ros2msg` text, their messages CDR. The record of metadata `sohle` holds name, sensor
-//! range and version; the record `about` whatever the writer had to say (parameters, seeds, origin). Nothing is
-//! compressed: the decoders of MCAP's compressions are C code.
+//! `/step`; of a live walk also `/shoe`, which holds every [message of the shoe](super::heard). Their schemas are
+//! `ros2msg` text, their messages CDR. The record of metadata `sohle` holds name, sensor range and version; the record
+//! `about` whatever the writer had to say (parameters, seeds, origin). Nothing is compressed: the decoders of MCAP's
+//! compressions are C code.
 //!
 //! # Why CDR
 //! JSON, MCAP's other self-describing encoding without a code generator, takes 138 bytes for a sample of the surveyed
@@ -101,6 +102,8 @@ impl Writer {
         let options = WriteOptions::new()
             .compression(None)
             .chunk_size(Some(CHUNK))
+            // Whoever is killed in the middle of a chunk leaves none of it, instead of one without its length.
+            .disable_seeking(live)
             .profile("ros2")
             .library(concat!("sohle ", env!("CARGO_PKG_VERSION")));
         writer.inner = Some(options.create(BufWriter::new(file)).map_err(|error| fail(problem(error)))?);
@@ -503,6 +506,7 @@ mod tests {
     use sohle_shared::sample::ClippedSamples;
     use sohle_shared::step::{FloorMode, StepQuality};
     use sohle_shared::time::Micros;
+    use sohle_shared::wire::message::{FromShoe, Level, Log, text};
 
     fn sample(time: i64, value: f32) -> ImuSample {
         let mut sample = ImuSample::new(Micros(time), [value, -value, 9.81], [value * 0.1, 1e-30, -0.0]);
@@ -597,6 +601,29 @@ mod tests {
     }
 
     #[test]
+    fn a_live_recording_can_be_read_at_any_moment_of_its_making() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("live.mcap");
+        let mut writer = Writer::live(&path, "live", &BTreeMap::new()).unwrap();
+        let mut told = 0;
+        for index in 0..6_000 {
+            let log = Log { time: Micros(0), level: Level::Info, text: text("a line as long as lines are") };
+            writer.heard(&Heard { time: Micros(index), message: FromShoe::Log(log) }).unwrap();
+            writer.step(&step(index as u32)).unwrap();
+            if index == 50 {
+                writer.flush().unwrap();
+            }
+            if index >= 50 && index % 97 == 50 {
+                // As a program leaves it that is killed now.
+                let steps = read(File::open(&path).unwrap()).unwrap().steps.len();
+                assert!(steps >= told && steps > 50, "{index}: {steps} after {told}");
+                told = steps;
+            }
+        }
+        assert!(told > 5_000, "{told}: chunks go out as they are full");
+    }
+
+    #[test]
     fn a_recording_that_cannot_be_written_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let message = |path: &Path| write(path, &full(1)).unwrap_err().to_string();
@@ -663,7 +690,9 @@ mod tests {
 
     #[test]
     fn an_mcap_takes_no_profile_and_needs_samples() {
-        let (_folder, path) = written(0);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("walk.mcap");
+        write(&path, &Recording { steps: Vec::new(), ..full(0) }).unwrap();
         let message = recording::open(&path, None).unwrap_err().to_string();
         assert!(message.ends_with("no samples: no message on /imu"), "{message}");
         let message = recording::open(&path, Some(&recording::Preset::Xio.into())).unwrap_err().to_string();
