@@ -1,6 +1,6 @@
 //! `sohle live` with a shoe in the same process: its application behind a network port, the sensor played back.
 
-use sohle_shared::bmx055::Config;
+use sohle_shared::bmx055::{Batch, Config};
 use sohle_shared::calibration::Calibration;
 use sohle_shared::selftest::{Batches, STRIDES};
 use sohle_shared::shoe::Shoe;
@@ -60,11 +60,12 @@ fn walk(listener: &TcpListener) {
     }
 }
 
-/// A shoe that stands and answers, laptop after laptop, until the process ends.
-fn stand(listener: &TcpListener) {
+/// A shoe that has walked, stands and answers, laptop after laptop, until the process ends.
+fn stand(listener: &TcpListener, walked: impl Iterator<Item = Batch>) {
     let identity = Identity { boot: 6, firmware: "test", board: "test" };
-    let outbox = Outbox::<4>::new(0, Pace::default());
+    let outbox = Outbox::<64>::new(0, Pace::default());
     let mut shoe = Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default(), outbox);
+    walked.for_each(|batch| shoe.sensed(&batch));
     let begun = Instant::now();
     loop {
         let mut line = accept(listener);
@@ -142,7 +143,7 @@ fn where_no_shoe_is_it_says_so() {
 fn a_shoe_does_what_it_is_asked_for() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("tcp:127.0.0.1:{}", listener.local_addr().unwrap().port());
-    std::thread::spawn(move || stand(&listener));
+    std::thread::spawn(move || stand(&listener, std::iter::empty()));
     let said = |arguments: &[&str]| {
         let output = sohle(&[&["command", address.as_str()], arguments].concat());
         let err = String::from_utf8_lossy(&output.stderr);
@@ -163,4 +164,31 @@ fn a_shoe_does_what_it_is_asked_for() {
     std::fs::write(&mine, "shoe_size = 43\n").unwrap();
     let refused = sohle(&["command", &address, "calibration", "set", mine.to_str().unwrap()]);
     assert!(String::from_utf8_lossy(&refused.stderr).contains("shoe_size"), "{refused:?}");
+}
+
+#[test]
+fn a_command_leaves_the_steps_for_who_records_them() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp:127.0.0.1:{}", listener.local_addr().unwrap().port());
+    std::thread::spawn(move || stand(&listener, Batches::new()));
+    for _ in 0..2 {
+        assert!(sohle(&["command", &address, "parameters", "get"]).status.success());
+    }
+    let steps = STRIDES.to_string();
+    let live = sohle(&["live", &address, "--no-record", "--steps", &steps, "--for", "20", "--format", "json"]);
+    let out = String::from_utf8_lossy(&live.stdout);
+    let told = out.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let ids: Vec<_> = told.filter_map(|event| event["id"].as_u64()).collect();
+    assert_eq!(ids, (0..STRIDES as u64).collect::<Vec<_>>(), "{}", String::from_utf8_lossy(&live.stderr));
+}
+
+#[test]
+fn a_recording_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("walk.mcap");
+    std::fs::write(&path, "an earlier walk").unwrap();
+    let live = sohle(&["live", "tcp:127.0.0.1:1", "--for", "0.1", "--out", path.to_str().unwrap()]);
+    let err = String::from_utf8_lossy(&live.stderr);
+    assert!(!live.status.success() && err.contains("walk.mcap is there already"), "{err}");
+    assert_eq!(std::fs::read(&path).unwrap(), b"an earlier walk");
 }

@@ -96,7 +96,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             (name, file.display().to_string(), calibrate(&recording, gravity, quiet)?, None)
         }
         Source::Shoe(address) => {
-            let mut connection = Connection::open(address);
+            let mut connection = Connection::open(address).leaving_steps();
             let conclusion = live(&mut connection, gravity, quiet)?;
             ("shoe".into(), "the shoe".into(), conclusion, Some(connection))
         }

@@ -16,7 +16,8 @@ use std::time::{Duration, Instant};
 
 /// Asks something of a shoe
 #[derive(Debug, clap::Args)]
-#[command(after_help = "A shoe speaks to one program at a time: a 'sohle live' that runs has to say hello anew.\n\n\
+#[command(after_help = "A shoe speaks to one program at a time: a 'sohle live' that runs has to say hello anew.\n\
+Steps that wait on the shoe stay there for 'sohle live'.\n\n\
 Examples:\n  sohle command serial:/dev/ttyACM0 reset\n  sohle command tcp:127.0.0.1:7700 parameters get mine.toml\n  \
 sohle command serial:/dev/ttyACM0 calibration set calibration.toml")]
 pub struct Args {
@@ -92,7 +93,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         What::Calibration { access: Access::Set { file } } => Some(Value::Calibration(calibration::read(file)?)),
         _ => None,
     };
-    let mut connection = Connection::open(args.address);
+    let mut connection = Connection::open(args.address).leaving_steps();
     connect(&mut connection)?;
     if let Some(value) = value {
         connection.write(&value, &mut |_, _| {})?;

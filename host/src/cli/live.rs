@@ -130,6 +130,10 @@ fn begin(path: Option<&Path>) -> Result<Recorder, Error> {
         },
         Path::to_path_buf,
     );
+    // What was heard once comes never again.
+    if path.is_file() {
+        return Err(Error::new(format!("{} is there already; a live recording replaces nothing", path.display())));
+    }
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Ok(Recorder::begin(&path, &name)?)
 }

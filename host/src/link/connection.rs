@@ -80,6 +80,12 @@ impl Connection {
         }
     }
 
+    /// Leaves the steps on the shoe, for the next program.
+    pub fn leaving_steps(mut self) -> Self {
+        self.session.leave_steps();
+        self
+    }
+
     /// The time since the connection was begun.
     pub fn now(&self) -> Micros {
         self.clock.now()

@@ -67,6 +67,8 @@ pub struct Session {
     refused: Option<Hello>,
     hello_due: Option<Micros>,
     hello_sent: Option<Micros>,
+    /// Steps are acknowledged.
+    takes_steps: bool,
     ack_due: Option<Micros>,
     ack_sent: Micros,
     questions: Questions,
@@ -95,6 +97,7 @@ impl Session {
             refused: None,
             hello_due: Some(Micros(0)),
             hello_sent: None,
+            takes_steps: true,
             ack_due: None,
             ack_sent: Micros(-ACK_US),
             questions: Questions::default(),
@@ -105,6 +108,11 @@ impl Session {
             heard: None,
             silent: false,
         }
+    }
+
+    /// Acknowledges no step from now on: they stay on the shoe for the next program.
+    pub fn leave_steps(&mut self) {
+        self.takes_steps = false;
     }
 
     /// Takes in bytes of the shoe, in whatever pieces they come.
@@ -220,7 +228,9 @@ impl Session {
                 }
             });
         }
-        self.ack_due.get_or_insert(now.max(self.ack_sent + ACK_US));
+        if self.takes_steps {
+            self.ack_due.get_or_insert(now.max(self.ack_sent + ACK_US));
+        }
     }
 
     fn reply(&mut self, reply: Reply, now: Micros) {
