@@ -165,6 +165,10 @@ pub fn check() -> Result<(), Failure> {
     for (name, walk, profile, seconds) in &walks {
         let counts = converted(&sohle, &folder, walk, *profile)?;
         let live = folder.join("live.mcap");
+        match std::fs::remove_file(&live) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => return Err(file(&live, source)),
+            _ => {}
+        }
         let port = free_port()?;
         let running = Running::start(port, &counts)?;
         let summary = live_walk(&sohle, port, *seconds, Some(&live))?;
