@@ -6,8 +6,9 @@ use sohle_shared::selftest::{Batches, STRIDES};
 use sohle_shared::shoe::Shoe;
 use sohle_shared::time::Micros;
 use sohle_shared::tracker::Parameters;
-use sohle_shared::wire::frame::FRAME_MAX;
+use sohle_shared::wire::frame::{AnyDecoder, FRAME_MAX};
 use sohle_shared::wire::link::Identity;
+use sohle_shared::wire::message::FromShoe;
 use sohle_shared::wire::outbox::{Outbox, Pace};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -17,34 +18,32 @@ use std::time::{Duration, Instant};
 /// The walk takes 33 s; here it goes so much faster.
 const SPEED: i64 = 8;
 
-/// Walks for the laptops that come to `listener`, one after the other; the line is cut once, in the middle of the walk.
+/// Walks for the laptops that come to `listener`, one after the other, from when the counts of the sensor are asked for; the
+/// line is cut once, in the middle of the walk.
 fn walk(listener: &TcpListener) {
     let identity = Identity { boot: 5, firmware: "test", board: "test" };
     let outbox = Outbox::<256>::new(0, Pace::default());
     let mut shoe = Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default(), outbox);
     let mut line = accept(listener);
     let begun = Instant::now();
-    let mut cut = false;
+    let (mut start, mut cut, mut ended) = (None, false, None);
     let mut batches = Batches::new().peekable();
-    let (mut buffer, mut bytes) = ([0; FRAME_MAX], [0; 256]);
-    // The walk begins when the laptop has had the time to ask for the counts.
-    let start = Micros(4_000_000);
-    let mut ended = None;
-    loop {
+    let mut bytes = [0; 256];
+    while ended.is_none_or(|ended: Instant| ended.elapsed() < Duration::from_secs(20)) {
         let now = Micros(begun.elapsed().as_micros() as i64 * SPEED);
-        while let Some(batch) = batches.next_if(|batch| batch.stamp + start.0 <= now) {
+        let walked = start.map_or(Micros(-1), |start| Micros(now - start));
+        while let Some(batch) = batches.next_if(|batch| batch.stamp <= walked) {
             shoe.sensed(&batch);
+            // A machine that is late must not make the shoe late, which has room for some batches only.
+            speak(&mut shoe, &mut line, now);
+            if !cut && batch.stamp > Micros(16_000_000) {
+                cut = true;
+                drop(line);
+                line = accept(listener);
+            }
         }
         if batches.peek().is_none() {
             ended.get_or_insert(Instant::now());
-        }
-        if ended.is_some_and(|ended| ended.elapsed() > Duration::from_secs(20)) {
-            return;
-        }
-        if !cut && now > Micros(20_000_000) {
-            cut = true;
-            drop(line);
-            line = accept(listener);
         }
         match line.read(&mut bytes) {
             Ok(0) => return,
@@ -52,12 +51,27 @@ fn walk(listener: &TcpListener) {
             Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(Duration::from_micros(500)),
             Err(_) => return,
         }
-        while let Some(frame) = shoe.transmit(now, &mut buffer) {
-            if line.write_all(frame).is_err() {
-                break;
+        if speak(&mut shoe, &mut line, now) {
+            start.get_or_insert(now);
+        }
+    }
+}
+
+/// Sends what the shoe has to say; whether counts of the sensor were among it. A line that is gone takes everything.
+fn speak<const STEPS: usize>(shoe: &mut Shoe<STEPS>, line: &mut TcpStream, now: Micros) -> bool {
+    let mut buffer = [0; FRAME_MAX];
+    let mut raw = false;
+    while let Some(mut frame) = shoe.transmit(now, &mut buffer) {
+        raw |= matches!(AnyDecoder::new().next(&mut { frame }), Some(Ok(FromShoe::Raw(_))));
+        while !frame.is_empty() {
+            match line.write(frame) {
+                Ok(count) => frame = &frame[count..],
+                Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(Duration::from_millis(1)),
+                Err(_) => break,
             }
         }
     }
+    raw
 }
 
 /// A shoe that has walked, stands and answers, laptop after laptop, until the process ends.
@@ -69,7 +83,7 @@ fn stand(listener: &TcpListener, walked: impl Iterator<Item = Batch>) {
     let begun = Instant::now();
     loop {
         let mut line = accept(listener);
-        let (mut buffer, mut bytes) = ([0; FRAME_MAX], [0; 256]);
+        let mut bytes = [0; 256];
         loop {
             let now = Micros(begun.elapsed().as_micros() as i64);
             match line.read(&mut bytes) {
@@ -81,11 +95,7 @@ fn stand(listener: &TcpListener, walked: impl Iterator<Item = Batch>) {
             if shoe.keep().is_some() {
                 shoe.kept(Ok(()));
             }
-            while let Some(frame) = shoe.transmit(now, &mut buffer) {
-                if line.write_all(frame).is_err() {
-                    break;
-                }
-            }
+            speak(&mut shoe, &mut line, now);
         }
     }
 }
