@@ -42,14 +42,38 @@ struct Force {
 }
 
 /// What lies between two frames of the accelerometer.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Interval {
-    /// Its earlier end.
-    start: Force,
-    /// Its later end. **Units:** ticks.
-    end: Force,
+    /// Time of its earlier end. **Units:** ticks.
+    start: i64,
+    /// Force at its earlier end. **Units:** m/s².
+    value: Vector3<f32>,
     /// **Units:** m/s² for each tick.
     slope: Vector3<f32>,
+    /// Whether one of its ends is at the end of the range.
+    clipped: bool,
+    /// Its later end.
+    end: Force,
+}
+
+impl Interval {
+    /// Before the first frame.
+    const NONE: Self = Self {
+        start: i64::MIN,
+        value: Vector3::new(0.0, 0.0, 0.0),
+        slope: Vector3::new(0.0, 0.0, 0.0),
+        clipped: false,
+        end: Force { time: i64::MIN, inverse: 0.0, value: Vector3::new(0.0, 0.0, 0.0), clipped: false },
+    };
+
+    /// Becomes the one that begins where it ended.
+    fn advance(&mut self, end: Force) {
+        self.start = self.end.time;
+        self.value = self.end.value;
+        self.slope = (end.value - self.value) * end.inverse;
+        self.clipped = self.end.clipped | end.clipped;
+        self.end = end;
+    }
 }
 
 /// Merges the batches of both dies.
@@ -61,7 +85,7 @@ pub struct Merger {
     rates: Deque<Rate, GYRO_FRAMES>,
     /// The last frame of the accelerometer that went into the queue. **Units:** ticks.
     last_force: Option<i64>,
-    interval: Option<Interval>,
+    interval: Interval,
     temperature: Option<i8>,
 }
 
@@ -83,7 +107,7 @@ impl Merger {
             forces: Deque::new(),
             rates: Deque::new(),
             last_force: None,
-            interval: None,
+            interval: Interval::NONE,
             temperature: None,
         }
     }
@@ -95,7 +119,7 @@ impl Merger {
         self.forces.clear();
         self.rates.clear();
         self.last_force = None;
-        self.interval = None;
+        self.interval = Interval::NONE;
         self.temperature = None;
     }
 
@@ -156,41 +180,25 @@ impl Merger {
     /// Hands out what lies between frames of the accelerometer that are there.
     fn merge(&mut self, mut sink: impl FnMut(&ImuSample)) {
         while let Some(&Rate { time, counts }) = self.rates.front() {
-            let Some(interval) = interval_of(time, &mut self.interval, &mut self.forces) else { return };
+            while self.interval.end.time < time {
+                let Some(end) = self.forces.pop_front() else { return };
+                self.interval.advance(end);
+            }
             self.rates.pop_front();
-            let since = time - interval.start.time;
-            if interval.end.inverse <= 0.0 || since < 0 {
+            let Interval { start, value, slope, clipped, end } = &self.interval;
+            if end.inverse <= 0.0 || time < *start {
                 continue;
             }
             // An interval is shorter than 2^31 ticks: 0.5 s.
-            let value = interval.start.value + interval.slope * (since as i32 as f32);
+            let since = (time - start) as i32 as f32;
             sink(&ImuSample {
                 time: Micros(rounded(time)),
-                accel: Accel(value),
+                accel: Accel(value + slope * since),
                 gyro: Gyro(counts.scaled(self.gyro.scale)),
-                clipped: Clipped {
-                    accel: interval.start.clipped | interval.end.clipped,
-                    gyro: counts.saturated(GyroConfig::BITS),
-                },
+                clipped: Clipped { accel: *clipped, gyro: counts.saturated(GyroConfig::BITS) },
             });
         }
     }
-}
-
-/// The first interval that ends at `time` or later; `None` when its end is not there yet.
-fn interval_of<'a>(
-    time: i64,
-    interval: &'a mut Option<Interval>,
-    forces: &mut Deque<Force, ACCEL_FRAMES>,
-) -> Option<&'a Interval> {
-    while interval.is_none_or(|interval| interval.end.time < time) {
-        let end = forces.pop_front()?;
-        // Before the first frame nothing is known: its interval has no length.
-        let start = interval.map_or(Force { inverse: 0.0, ..end }, |interval| interval.end);
-        let end = if start.time == end.time { start } else { end };
-        *interval = Some(Interval { start, end, slope: (end.value - start.value) * end.inverse });
-    }
-    interval.as_ref()
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! Accelerometer or gyroscope of the twin: registers, clock, FIFO, interrupt line.
 
+use super::address::Address;
 use super::fifo::{EMPTY, FRAME, Fifo};
 use crate::bmx055::batch::Die;
 use crate::bmx055::config::{period_of_accel, period_of_gyro};
-use crate::bmx055::registers::{READ, accel, both, gyro};
+use crate::bmx055::registers::{accel, both, gyro};
 
 /// Addresses of seven bits.
 const REGISTERS: usize = 128;
@@ -74,8 +75,7 @@ pub(super) struct DieTwin {
     edge_ns: Option<u64>,
     /// Start of the transaction.
     selected_ns: u64,
-    /// Address of the transaction, once it is known.
-    address: Option<u8>,
+    address: Address,
     fifo_bytes: usize,
     pub temperature: i8,
     pub faults: Faults,
@@ -98,7 +98,7 @@ impl DieTwin {
             line: false,
             edge_ns: None,
             selected_ns: 0,
-            address: None,
+            address: Address::default(),
             fifo_bytes: 0,
             temperature: 0,
             faults: Faults::default(),
@@ -263,21 +263,14 @@ impl DieTwin {
 
     /// Chip select falls.
     pub fn select(&mut self, now_ns: u64) {
-        self.address = None;
+        self.address.select();
         self.selected_ns = now_ns;
     }
 
     /// A byte goes either way; the first is the address.
     pub fn exchange(&mut self, sent: u8, now_ns: u64) -> u8 {
-        let Some(address) = self.address else {
-            self.address = Some(sent);
-            return 0;
-        };
-        let register = address & !READ;
-        if register != both::FIFO_DATA {
-            self.address = Some(address & READ | register.wrapping_add(1) & !READ);
-        }
-        if address & READ != 0 {
+        let Some((register, read)) = self.address.next(sent) else { return 0 };
+        if read {
             return self.read(register, now_ns);
         }
         self.write(register, sent, now_ns);

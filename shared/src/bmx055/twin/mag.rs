@@ -1,6 +1,7 @@
 //! The magnetometer of the twin: it sleeps, is woken, takes one reading when told to.
 
-use crate::bmx055::registers::{READ, mag};
+use super::address::Address;
+use crate::bmx055::registers::mag;
 
 /// Duration of one reading with the fewest repetitions (BMM150, 4.2.4: 0.15 + 0.5 + 0.98 ms). **Units:** ns.
 const READING_NS: u64 = 1_630_000;
@@ -11,7 +12,7 @@ pub(super) struct MagTwin {
     on: bool,
     boot_ns: u64,
     ready_ns: Option<u64>,
-    address: Option<u8>,
+    address: Address,
     /// x, y, z and hall resistance, right-justified.
     pub field: [i16; 4],
     pub chip_id: Option<u8>,
@@ -22,18 +23,13 @@ pub(super) struct MagTwin {
 impl MagTwin {
     /// Chip select falls.
     pub fn select(&mut self) {
-        self.address = None;
+        self.address.select();
     }
 
     /// A byte goes either way; the first is the address.
     pub fn exchange(&mut self, sent: u8, now_ns: u64) -> u8 {
-        let Some(address) = self.address else {
-            self.address = Some(sent);
-            return 0;
-        };
-        let register = address & !READ;
-        self.address = Some(address & READ | register.wrapping_add(1) & !READ);
-        if address & READ != 0 {
+        let Some((register, read)) = self.address.next(sent) else { return 0 };
+        if read {
             return self.read(register, now_ns);
         }
         match register {

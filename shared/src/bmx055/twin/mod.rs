@@ -8,6 +8,7 @@
 //! The readings come from a function of die and time, so a recording, a simulator and an iterator are all the same to
 //! it. Sources of the rules are at [`registers`](super::registers).
 
+mod address;
 mod die;
 mod fifo;
 mod mag;
