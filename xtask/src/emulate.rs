@@ -192,7 +192,8 @@ fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<(), Fail
     let running = Running::start(shoe, counts)?;
     let proxy =
         Proxy::start(laptop, shoe).map_err(|source| Failure::NotStarted { program: "the bad line".into(), source })?;
-    let summary = live_walk(sohle, laptop, seconds + 5, None)?;
+    // Time for what is sent again, and for an emulator that does not keep up.
+    let summary = live_walk(sohle, laptop, seconds + 15, None)?;
     let (damaged, lost) = proxy.faults();
     drop(running);
     row("the first over a bad line", &summary);
