@@ -145,7 +145,8 @@ impl Adaptive {
     /// The stillest moment of about the last stride, within its bounds. **Units:** 1.
     pub fn stillest(&self) -> f32 {
         let least = self.least.iter().fold(f32::INFINITY, |least, &part| if part < least { part } else { least });
-        least.clamp(self.parameters.floor, self.parameters.ceiling)
+        // Not `clamp`, which panics when settings put the floor above the ceiling.
+        least.max(self.parameters.floor).min(self.parameters.ceiling)
     }
 
     /// Judges the moment `time` from its statistic and, if there is a filter that knows it, from the speed of the foot.
@@ -217,7 +218,7 @@ impl Adaptive {
         let part = ((self.parameters.lookback_s * 1e6) as i64 / PARTS as i64).max(1);
         let start = *self.part_start.get_or_insert(time);
         let passed = time - start;
-        if passed < 0 || passed >= part * (PARTS as i64 + 1) {
+        if passed < 0 || passed >= part.saturating_mul(PARTS as i64 + 1) {
             self.least = [0.0; PARTS];
             self.part_start = Some(time);
         } else {
@@ -314,6 +315,29 @@ mod tests {
             };
             let (calmer, other) = if a < b { (a, b) } else { (b, a) };
             prop_assert!(sigma(calmer) <= sigma(other));
+        }
+
+        #[test]
+        fn no_settings_make_it_panic(
+            [accel_sigma, gyro_sigma, lookback_s, floor, ceiling, limit, velocity_sigma] in [any::<f32>(); 7],
+            [enter, leave, confirm_s, swing_speed, new_pace_speed, new_pace_after_s] in [any::<f32>(); 6],
+            moments in prop::collection::vec((any::<i64>(), any::<f32>(), any::<f32>()), 1..40),
+        ) {
+            let parameters = Parameters {
+                accel_sigma, gyro_sigma, lookback_s, floor, ceiling, limit, velocity_sigma,
+                enter, leave, confirm_s, swing_speed, new_pace_speed, new_pace_after_s,
+            };
+            let mut detector = Adaptive::new(&parameters);
+            for (time, statistic, speed) in moments {
+                detector.judge(Micros(time), statistic, at(speed));
+            }
+        }
+
+        #[test]
+        fn the_stillest_moment_is_never_above_the_ceiling(floor in 0.0_f32..1e6, ceiling in 0.0_f32..1e6, least in 0.0_f32..1e6) {
+            let mut detector = Adaptive::new(&Parameters { floor, ceiling, ..Parameters::default() });
+            detector.judge(Micros(0), least, None);
+            prop_assert!(detector.stillest() <= ceiling);
         }
     }
 }
