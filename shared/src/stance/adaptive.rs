@@ -86,11 +86,10 @@ pub struct Speed {
 /// Parts that the time looked back over is cut into.
 const PARTS: usize = 16;
 
-/// The detector. As a [`StanceDetector`] it works on samples alone; [`Adaptive::judge`] also takes the speed.
+/// The detector, for who knows the statistic of a moment and, if there is a filter, the speed: [`Adaptive::judge`].
 #[derive(Clone, Debug)]
 pub struct Adaptive {
     parameters: Parameters,
-    shoe: Shoe,
     /// Least statistic of each part of the time looked back over; the last is the running one.
     least: [f32; PARTS],
     part_start: Option<Micros>,
@@ -106,14 +105,8 @@ pub struct Adaptive {
 impl Adaptive {
     /// A detector that has seen nothing.
     pub fn new(parameters: &Parameters) -> Self {
-        let statistic = shoe::Parameters {
-            accel_sigma: parameters.accel_sigma,
-            gyro_sigma: parameters.gyro_sigma,
-            ..Default::default()
-        };
         Self {
             parameters: *parameters,
-            shoe: Shoe::new(&statistic),
             // Nothing seen yet: someone may have stood still.
             least: [0.0; PARTS],
             part_start: None,
@@ -124,6 +117,11 @@ impl Adaptive {
             calm_since: None,
             stood_until: None,
         }
+    }
+
+    /// Forgets everything seen.
+    pub fn reset(&mut self) {
+        *self = Self::new(&self.parameters);
     }
 
     /// The SHOE statistic of some samples from their sums. **Units:** `count` samples, m/s², m²/s⁴, rad²/s², m/s².
@@ -153,7 +151,7 @@ impl Adaptive {
     pub fn judge(&mut self, time: Micros, statistic: f32, speed: Option<Speed>) -> Verdict {
         let p = self.parameters;
         if !statistic.is_finite() {
-            *self = Self { shoe: self.shoe.clone(), ..Self::new(&p) };
+            self.reset();
             return Verdict::unknown();
         }
         self.look_for_a_new_pace(statistic, speed);
@@ -233,14 +231,31 @@ impl Adaptive {
     }
 }
 
-impl StanceDetector for Adaptive {
+/// The detector on samples alone, with the window that it takes the statistic from.
+#[derive(Clone, Debug)]
+pub struct FromSamples {
+    shoe: Shoe,
+    adaptive: Adaptive,
+}
+
+impl FromSamples {
+    /// A detector that has seen nothing.
+    pub fn new(parameters: &Parameters) -> Self {
+        let &Parameters { accel_sigma, gyro_sigma, .. } = parameters;
+        let statistic = shoe::Parameters { accel_sigma, gyro_sigma, ..Default::default() };
+        Self { shoe: Shoe::new(&statistic), adaptive: Adaptive::new(parameters) }
+    }
+}
+
+impl StanceDetector for FromSamples {
     fn push(&mut self, time: Micros, accel: AccelCorrected, gyro: GyroCorrected, gravity: f32) -> Verdict {
         let statistic = self.shoe.push(time, accel, gyro, gravity).statistic;
-        self.judge(time, statistic, None)
+        self.adaptive.judge(time, statistic, None)
     }
 
     fn reset(&mut self) {
-        *self = Self::new(&self.parameters);
+        self.shoe.reset();
+        self.adaptive.reset();
     }
 }
 

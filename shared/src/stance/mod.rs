@@ -70,7 +70,7 @@ mod tests {
 
     fn all() -> [(&'static str, Box<dyn StanceDetector>); 6] {
         [
-            ("adaptive", Box::new(adaptive::Adaptive::new(&adaptive::Parameters::default()))),
+            ("adaptive", Box::new(adaptive::FromSamples::new(&adaptive::Parameters::default()))),
             ("documented", Box::new(documented::Documented::new(&documented::Parameters::default()))),
             ("shoe", Box::new(shoe::Shoe::new(&shoe::Parameters::default()))),
             ("ared", Box::new(ared::Ared::new(&ared::Parameters::default()))),

@@ -62,7 +62,7 @@ enum AnyDetector {
     Ared(stance::ared::Ared),
     Amv(stance::amv::Amv),
     Mag(stance::mag::Mag),
-    Adaptive(stance::adaptive::Adaptive),
+    Adaptive(stance::adaptive::FromSamples),
 }
 
 impl AnyDetector {
@@ -74,7 +74,7 @@ impl AnyDetector {
             Detector::Ared => Self::Ared(stance::ared::Ared::new(&d.ared)),
             Detector::Amv => Self::Amv(stance::amv::Amv::new(&d.amv)),
             Detector::Mag => Self::Mag(stance::mag::Mag::new(&d.mag)),
-            Detector::Adaptive => Self::Adaptive(stance::adaptive::Adaptive::new(&p.stance)),
+            Detector::Adaptive => Self::Adaptive(stance::adaptive::FromSamples::new(&p.stance)),
         }
     }
 

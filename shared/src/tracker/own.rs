@@ -11,7 +11,6 @@ use crate::filter::state::POSITION;
 use crate::preintegration::{Increment, Preintegrator};
 use crate::rest::RestDetector;
 use crate::sample::{AccelBias, GyroBias, ImuSample, STANDARD_GRAVITY_M_S2};
-use crate::stance::StanceDetector;
 use crate::stance::adaptive::Adaptive;
 use crate::step::{FloorMode, Step};
 use crate::time::Micros;
