@@ -328,7 +328,7 @@ impl Show {
                     "event": "summary", "connected": self.boot.is_some(), "steps": self.steps, "lost": self.lost,
                     "doubled": self.doubled, "distance_m": self.distance, "delay_median_ms": median,
                     "delay_max_ms": longest, "clock_error_bound_ms": bound, "frames": counters.frames.good,
-                    "frames_bad": counters.frames.bad(), "reboots": counters.reboots, "raw": self.raw,
+                    "frames_bad": counters.frames.bad(), "mended": counters.mended, "reboots": counters.reboots, "raw": self.raw,
                     "raw_lost": self.raw_lost, "waiting": self.status.map(|status| status.waiting),
                     "load": self.status.map(|status| status.load), "stack": self.status.map(|status| status.stack),
                     "lateness_us": self.status.map(|status| status.lateness_us),
@@ -337,9 +337,13 @@ impl Show {
             Format::Table => {
                 let ms = |value: Option<f64>| value.map_or("unknown".into(), |value| format!("{value:.1} ms"));
                 let Self { steps, lost, doubled, distance, .. } = self;
+                let mended = match counters.mended {
+                    0 => String::new(),
+                    mended => format!(", {mended} messages put together from those"),
+                };
                 print(&format!(
                     "{steps} steps, {lost} lost, {doubled} doubled, {distance:.1} m; from the end of the stance {} (median), \
-                     {} (longest)\nclock of the shoe known within {}; {} frames, {} damaged{}\n",
+                     {} (longest)\nclock of the shoe known within {}; {} frames, {} damaged{mended}{}\n",
                     ms(median),
                     ms(longest),
                     ms(bound),

@@ -53,12 +53,25 @@ pub enum Kind {
     Restart,
     /// As [`Kind::Both`]; in the middle the shoe is.
     Reboot,
+    /// One bit in a hundred is flipped: a step comes whole once in a hundred times.
+    Flipped,
+    /// As [`Kind::Flipped`], and one frame in ten is lost.
+    FlippedLossy,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Clean, Self::Damaged, Self::Lossy, Self::Both, Self::Silence, Self::Restart, Self::Reboot];
+    pub const ALL: [Self; 9] = [
+        Self::Clean,
+        Self::Damaged,
+        Self::Lossy,
+        Self::Both,
+        Self::Silence,
+        Self::Restart,
+        Self::Reboot,
+        Self::Flipped,
+        Self::FlippedLossy,
+    ];
 
     /// In words.
     pub fn name(self) -> &'static str {
@@ -70,6 +83,8 @@ impl Kind {
             Self::Silence => "these, and 10 min of silence",
             Self::Restart => "these, and the program restarted",
             Self::Reboot => "these, and the shoe rebooted",
+            Self::Flipped => "1 % of bits flipped",
+            Self::FlippedLossy => "these, and 10 % of frames lost",
         }
     }
 
@@ -79,6 +94,8 @@ impl Kind {
             Self::Clean => clean,
             Self::Damaged => Faults { damage: 0.01, ..clean },
             Self::Lossy => Faults { loss: 0.1, ..clean },
+            Self::Flipped => Faults { flips: 0.01, ..clean },
+            Self::FlippedLossy => Faults { flips: 0.01, loss: 0.1, ..clean },
             _ => {
                 let silence = match self {
                     Self::Silence => middle..middle + SILENCE_US,
@@ -366,6 +383,20 @@ mod tests {
                 // One is on its way at a time, or two while the line is bad.
                 assert!(erased <= if kind == Kind::Reboot { 2 } else { 0 }, "{kind:?} {seed}: {tally:?}");
                 // Rounding of two clocks to microseconds.
+                assert!(tally.clock_excess_max_s < 3e-6, "{kind:?} {seed}: {tally:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_hour_with_one_bit_in_a_hundred_flipped_loses_nothing() {
+        for kind in [Kind::Flipped, Kind::FlippedLossy] {
+            for seed in 1..=4 {
+                let tally = run(kind, 3_273, seed);
+                let Tally { arrived, lost, doubled, wrong, .. } = tally;
+                assert_eq!((arrived, lost, doubled, wrong), (3_273, 0, 0, 0), "{kind:?} {seed}: {tally:?}");
+                // Three copies, 100 ms from one to the next, and as many again where those do not do.
+                assert!(tally.delay_median_s < 0.6, "{kind:?} {seed}: {tally:?}");
                 assert!(tally.clock_excess_max_s < 3e-6, "{kind:?} {seed}: {tally:?}");
             }
         }

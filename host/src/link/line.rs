@@ -12,6 +12,8 @@ use std::ops::Range;
 pub struct Faults {
     /// Chance of a byte to come with one bit flipped.
     pub damage: f64,
+    /// Chance of a bit to come flipped.
+    pub flips: f64,
     /// Chance of a whole write to be lost.
     pub loss: f64,
     /// Chance of a piece of a write to come twice.
@@ -53,6 +55,10 @@ impl Line {
         for byte in &mut bytes {
             if self.happens(self.faults.damage) {
                 *byte ^= 1 << (8.0 * self.random.unit()) as u32;
+            }
+            // Lines without it keep their random numbers.
+            if self.faults.flips > 0.0 {
+                *byte = (0..8).fold(*byte, |byte, bit| byte ^ u8::from(self.happens(self.faults.flips)) << bit);
             }
         }
         let cut = (bytes.len() as f64 * self.random.unit()) as usize;
@@ -129,6 +135,9 @@ mod tests {
         let damaged = carried(Faults { damage: 0.01, ..clean.clone() }, 2);
         let wrong = damaged.iter().zip(written()).map(|(a, b)| (a ^ b).count_ones()).sum::<u32>();
         assert!(damaged.len() == 20_000 && wrong.abs_diff(200) < 57, "{wrong}");
+        let flipped = carried(Faults { flips: 0.01, ..clean.clone() }, 8);
+        let wrong = flipped.iter().zip(written()).map(|(a, b)| (a ^ b).count_ones()).sum::<u32>();
+        assert!(flipped.len() == 20_000 && wrong.abs_diff(1_600) < 159, "{wrong}");
         let lost = 1_000 - carried(Faults { loss: 0.1, ..clean.clone() }, 3).len() / 20;
         assert!(lost.abs_diff(100) < 38, "{lost}");
         let doubled = carried(Faults { doubling: 0.1, ..clean.clone() }, 4).len();

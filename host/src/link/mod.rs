@@ -10,6 +10,7 @@
 pub mod address;
 pub mod clock;
 pub mod connection;
+mod copies;
 pub mod endurance;
 pub mod event;
 pub mod line;

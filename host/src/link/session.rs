@@ -6,10 +6,11 @@
 //! is forgotten by the shoe. Times are those of one clock of the laptop.
 
 use super::clock::Clock;
+use super::copies::Decoder;
 pub use super::event::{Event, mismatch};
 use super::questions::Questions;
 use sohle_shared::time::Micros;
-use sohle_shared::wire::frame::{AnyDecoder, FRAME_MAX, FrameCounters, encode};
+use sohle_shared::wire::frame::{FRAME_MAX, FrameCounters, encode};
 use sohle_shared::wire::inbox::{Delivery, Inbox};
 use sohle_shared::wire::message::{Action, Command, FromShoe, Hello, LaptopHello, Reply, SentStep, ToShoe, text};
 use sohle_shared::wire::{PROTOCOL, SCHEMA};
@@ -17,8 +18,8 @@ use std::collections::VecDeque;
 
 /// Between two hellos that nobody answers. **Units:** microseconds, as all of these.
 const HELLO_US: i64 = 1_000_000;
-/// A shoe that asks for a hello gets one no more often than this.
-const HELLO_SHORTEST_US: i64 = 100_000;
+/// A shoe that asks for a hello, or cannot be understood, is told again what it may not have heard no more often than this.
+const SAID_AGAIN_US: i64 = 100_000;
 /// Between two acknowledgements.
 const ACK_US: i64 = 20_000;
 /// Between two tries of a command.
@@ -45,6 +46,8 @@ pub struct Counters {
     pub round_trips: u64,
     /// Frames that came.
     pub frames: FrameCounters,
+    /// Messages put together from damaged frames.
+    pub mended: u64,
 }
 
 /// One run of the program at its end of the wire.
@@ -53,7 +56,7 @@ pub struct Session {
     hello: LaptopHello,
     /// The latest time told.
     now: Micros,
-    decoder: AnyDecoder,
+    decoder: Decoder,
     events: VecDeque<Event>,
     counters: Counters,
     clock: Clock,
@@ -63,6 +66,8 @@ pub struct Session {
     greeted: bool,
     /// The line was opened anew, perhaps to a shoe that was there before.
     reopened: bool,
+    /// What came last could not be read.
+    garbled: bool,
     /// What was last told as refused.
     refused: Option<Hello>,
     hello_due: Option<Micros>,
@@ -87,13 +92,14 @@ impl Session {
         Self {
             hello: LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session, software: text(software) },
             now: Micros(0),
-            decoder: AnyDecoder::new(),
+            decoder: Decoder::default(),
             events: VecDeque::new(),
             counters: Counters::default(),
             clock: Clock::default(),
             boots: VecDeque::new(),
             greeted: false,
             reopened: false,
+            garbled: false,
             refused: None,
             hello_due: Some(Micros(0)),
             hello_sent: None,
@@ -119,8 +125,11 @@ impl Session {
     pub fn receive(&mut self, mut bytes: &[u8], now: Micros) {
         self.advance(now);
         while let Some(frame) = self.decoder.next(&mut bytes) {
-            let Ok(message) = frame else { continue };
-            self.heard = Some(now);
+            let Ok(message) = frame else {
+                self.unreadable(now);
+                continue;
+            };
+            (self.heard, self.garbled) = (Some(now), false);
             if std::mem::take(&mut self.silent) {
                 self.events.push_back(Event::Back);
             }
@@ -153,6 +162,17 @@ impl Session {
         }
     }
 
+    /// Whatever it was, the shoe may say it since it has not heard us.
+    fn unreadable(&mut self, now: Micros) {
+        self.garbled = true;
+        if self.hello_due.is_some() {
+            self.ask_for_hello(now, SAID_AGAIN_US);
+        } else if self.greeted && self.takes_steps {
+            let due = now.max(self.ack_sent + SAID_AGAIN_US);
+            self.ack_due = Some(self.ack_due.map_or(due, |planned| planned.min(due)));
+        }
+    }
+
     fn greet(&mut self, hello: Hello, now: Micros) {
         if (hello.protocol, hello.schema) != (PROTOCOL, SCHEMA) {
             // Such a shoe goes on to say hello: we shall hear when it has another firmware.
@@ -179,7 +199,7 @@ impl Session {
         }
         self.refused = None;
         if !hello.accepted {
-            self.ask_for_hello(now, HELLO_SHORTEST_US);
+            self.ask_for_hello(now, SAID_AGAIN_US);
             return;
         }
         (self.hello_due, self.reopened) = (None, false);
@@ -279,7 +299,9 @@ impl Session {
             }
         }
         if self.hello_due.is_some_and(|due| due <= now) {
-            (self.hello_due, self.hello_sent) = (Some(now + HELLO_US), Some(now));
+            // Of many on such a line one is heard, and the shoe has no reason to say anything before.
+            let again_us = if self.garbled { SAID_AGAIN_US } else { HELLO_US };
+            (self.hello_due, self.hello_sent) = (Some(now + again_us), Some(now));
             // Whoever answers may have another clock.
             self.questions.forget();
             say(&ToShoe::Hello(self.hello.clone()), out);
@@ -312,7 +334,7 @@ impl Session {
     /// The line was opened anew: half a frame is forgotten and hello is said again.
     pub fn reconnected(&mut self) {
         self.decoder.restart();
-        (self.greeted, self.reopened, self.refused) = (false, true, None);
+        (self.greeted, self.reopened, self.garbled, self.refused) = (false, true, false, None);
         self.hello_due = Some(self.now);
     }
 
@@ -323,7 +345,7 @@ impl Session {
 
     /// What was counted so far.
     pub fn counters(&self) -> Counters {
-        Counters { frames: *self.decoder.counters(), ..self.counters }
+        Counters { frames: *self.decoder.counters(), mended: self.decoder.mended(), ..self.counters }
     }
 }
 
@@ -466,6 +488,32 @@ mod tests {
         assert_eq!(ids(&mut session), [(1, 0), (1, 1), (1, 2)]);
         let Counters { steps, repeated, gaps, .. } = session.counters();
         assert_eq!((steps, repeated, gaps), (3, 1, 0));
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_answered_with_what_the_shoe_may_not_have_heard() {
+        let garbage = |session: &mut Session, millis: i64| session.receive(&[0, 9, 9, 0], Micros(millis * 1_000));
+        let mut session = Session::new(SESSION, "0.9");
+        assert_eq!(times(&all_said(&mut session, 0, 300), IS_HELLO), [0]);
+        for millis in [300, 310, 390] {
+            garbage(&mut session, millis);
+        }
+        assert_eq!(times(&all_said(&mut session, 390, 700), IS_HELLO), [390, 490, 590, 690]);
+        hear(&mut session, &FromShoe::Hello(hello(1, true)), 700);
+        assert_eq!(times(&all_said(&mut session, 700, 900), IS_HELLO), [0; 0]);
+        let mut session = connected();
+        garbage(&mut session, 950);
+        assert_eq!(all_said(&mut session, 950, 1_000), [], "no step has come that could be acknowledged");
+        hear(&mut session, &sent(1, 0), 1_000);
+        let ack = ToShoe::Ack(Ack { boot: 1, next: 1, later: 0 });
+        assert_eq!(said(&mut session, 1_000), std::slice::from_ref(&ack));
+        for millis in [1_010, 1_050] {
+            garbage(&mut session, millis);
+        }
+        assert_eq!(all_said(&mut session, 1_050, 1_200), [(1_100, ack)]);
+        session.leave_steps();
+        garbage(&mut session, 1_300);
+        assert!(all_said(&mut session, 1_300, 1_500).iter().all(|(_, message)| IS_QUESTION(message)));
     }
 
     #[test]

@@ -21,6 +21,8 @@ use core::borrow::BorrowMut;
 
 /// Between two hellos that nobody answers. **Units:** microseconds.
 const HELLO_US: i64 = 1_000_000;
+/// The same while what comes cannot be understood: it may have been the answer. **Units:** microseconds.
+const SAID_AGAIN_US: i64 = 100_000;
 
 /// The laptop's longest message with its checksum: a piece of the parameters. **Units:** bytes.
 const TO_SHOE_MAX: usize = transfer::CHUNK_MAX + 40;
@@ -163,7 +165,10 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
     /// Takes in bytes of the laptop, in whatever pieces they come.
     pub fn receive(&mut self, mut bytes: &[u8], now: Micros) {
         while let Some(frame) = self.decoder.next(&mut bytes) {
-            let Ok(message) = frame else { continue };
+            let Ok(message) = frame else {
+                self.unreadable(now);
+                continue;
+            };
             self.outbox.borrow_mut().hear(now);
             match message {
                 ToShoe::Hello(hello) => self.greet(&hello, now),
@@ -175,6 +180,13 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
                 ToShoe::TimeRequest(number) => self.question = Some((number, now)),
                 ToShoe::Command(command) => self.command(command, now),
             }
+        }
+    }
+
+    fn unreadable(&mut self, now: Micros) {
+        if !self.connected() {
+            let soonest = self.hello_due + (SAID_AGAIN_US - HELLO_US);
+            self.hello_due = self.hello_due.min(soonest.max(now));
         }
     }
 
@@ -369,6 +381,22 @@ mod tests {
         // Another program replaces the one that was there.
         hear(&mut link, &hello(SESSION, SCHEMA ^ 1), Micros(HELLO_US + 3));
         assert!(!link.connected());
+    }
+
+    #[test]
+    fn what_cannot_be_read_before_the_greeting_is_answered_with_a_hello_but_not_too_often() {
+        let mut link = link();
+        assert_eq!(say(&mut link, Micros(0)).len(), 1);
+        let garbage = [0, 9, 9, 0];
+        link.receive(&garbage, Micros(20_000));
+        assert_eq!(link.deadline(Micros(20_000)), Micros(SAID_AGAIN_US));
+        assert_eq!(say(&mut link, Micros(SAID_AGAIN_US)).len(), 1);
+        link.receive(&garbage, Micros(500_000));
+        assert_eq!(say(&mut link, Micros(500_000)).len(), 1);
+        assert_eq!(link.deadline(Micros(500_000)), Micros(500_000 + HELLO_US));
+        let mut link = connected();
+        link.receive(&garbage, Micros(500_000));
+        assert!(say(&mut link, Micros(900_000)).is_empty());
     }
 
     #[test]

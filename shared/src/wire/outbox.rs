@@ -34,12 +34,13 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// For a serial line: 200 steps in a second are 12 % of 921 600 baud.
+    /// For a serial line: 200 steps in a second are 12 % of 921 600 baud, so waiting ever longer would spare nothing. A
+    /// round trip takes 20 ms or less, and where only a few frames come whole, each try counts.
     pub const SERIAL: Self = Self {
         spacing_us: 5_000,
-        first_timeout_us: 250_000,
+        first_timeout_us: 100_000,
         shortest_timeout_us: 50_000,
-        longest_timeout_us: 1_000_000,
+        longest_timeout_us: 100_000,
         silence_us: 3_000_000,
         longest_probe_us: 8_000_000,
     };
@@ -370,6 +371,7 @@ mod tests {
     #[test]
     fn unanswered_steps_wait_twice_as_long_each_time() {
         let mut outbox = filled::<8>(1);
+        outbox.begin(Pace { first_timeout_us: 250_000, longest_timeout_us: 1_000_000, ..Pace::default() });
         let mut now = Micros(0);
         assert_eq!(
             sent(&mut outbox, &mut now, Micros(2_900_000)),
@@ -379,13 +381,28 @@ mod tests {
     }
 
     #[test]
+    fn on_a_serial_line_each_try_comes_soon() {
+        let mut outbox = filled::<8>(1);
+        let mut now = Micros(0);
+        assert_eq!(sent(&mut outbox, &mut now, Micros(350_000)), [(0, 0), (100, 0), (200, 0), (300, 0)]);
+        outbox.push(step(1));
+        now = Micros(360_000);
+        outbox.acknowledge(&ack(1, 0), now);
+        sent(&mut outbox, &mut now, Micros(361_000));
+        outbox.acknowledge(&ack(2, 0), Micros(365_000));
+        // A round trip was measured.
+        outbox.push(step(2));
+        assert_eq!(sent(&mut outbox, &mut now, Micros(700_000)), [(365, 2), (415, 2), (515, 2), (615, 2)]);
+    }
+
+    #[test]
     fn in_silence_only_the_oldest_is_tried_ever_more_rarely() {
         let mut outbox = filled::<2_000>(1_000);
         let mut now = Micros(10_000_000);
         let tries = sent(&mut outbox, &mut now, Micros(610_000_000));
         assert!(tries.iter().all(|&(_, id)| id == 0));
-        // 0.25, 0.5, 1, 2, 4, then every 8 s.
-        assert_eq!(tries.len(), 5 + 75);
+        // 0.1, 0.2, 0.4 and so on to 6.4 s, then every 8 s.
+        assert_eq!(tries.len(), 7 + 74);
         assert!(tries.windows(2).all(|pair| pair[1].0 - pair[0].0 <= 8_000));
     }
 
