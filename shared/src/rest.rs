@@ -95,6 +95,12 @@ impl RestDetector {
         Some(Rest { gyro, accel: Vector3::new(ax, ay, az), bias_sigma, gyro_sigma, accel_sigma })
     }
 
+    /// As new, with other settings.
+    pub fn restart(&mut self, parameters: &Parameters) {
+        self.parameters = *parameters;
+        self.window.restart(parameters.window_s, MINIMUM);
+    }
+
     /// Forgets everything seen.
     pub fn reset(&mut self) {
         self.window.clear();

@@ -27,9 +27,14 @@ impl Settings {
         Self(store.inspect_err(|error| tell("the store does not open", error)).ok())
     }
 
-    /// Parameters in effect.
+    /// Parameters in effect. Those of a method that this program does not have are not used.
     pub fn parameters(&mut self) -> Parameters {
-        self.load()
+        let mut parameters: Parameters = self.load();
+        if !parameters.method.available() {
+            defmt::warn!("the stored parameters are for a method that this firmware does not have");
+            parameters = Parameters::default();
+        }
+        parameters
     }
 
     /// Calibration in effect.

@@ -97,19 +97,31 @@ struct Stream {
     scale: f32,
 }
 
+impl Stream {
+    fn new(period_us: u32, scale: f32) -> Self {
+        Self { clock: Clock::new(period_us), scale }
+    }
+}
+
 impl Merger {
     /// For a sensor set up like this.
     pub fn new(config: &Config) -> Self {
-        let stream = |period_us, scale| Stream { clock: Clock::new(period_us), scale };
         Self {
-            accel: stream(config.accel.period_us(), config.accel.scale()),
-            gyro: stream(config.gyro.period_us(), config.gyro.scale()),
+            accel: Stream::new(config.accel.period_us(), config.accel.scale()),
+            gyro: Stream::new(config.gyro.period_us(), config.gyro.scale()),
             forces: Deque::new(),
             rates: Deque::new(),
             last_force: None,
             interval: Interval::NONE,
             temperature: None,
         }
+    }
+
+    /// As new, for a sensor set up like this.
+    pub fn restart(&mut self, config: &Config) {
+        self.accel = Stream::new(config.accel.period_us(), config.accel.scale());
+        self.gyro = Stream::new(config.gyro.period_us(), config.gyro.scale());
+        self.reset();
     }
 
     /// Forgets everything, as when the sensor has booted anew.

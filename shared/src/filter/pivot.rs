@@ -156,6 +156,13 @@ impl PivotFilter {
         filter
     }
 
+    /// As new, with other settings.
+    pub fn restart(&mut self, parameters: &Parameters) {
+        self.parameters = *parameters;
+        self.repaired = 0;
+        self.start(&Vector3::new(0.0, 0.0, STANDARD_GRAVITY_M_S2), None);
+    }
+
     /// Starts in the origin, standing, with the vertical along `accel`, the mean specific force. **Units:** m/s²;
     /// **Frame:** sensor. `bias` is the mean angular rate of a rest and how well it shows the bias, or nothing when the
     /// walk was on already.

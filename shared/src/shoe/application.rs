@@ -142,6 +142,9 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             }
             // A raw recording is computed again with one set of values.
             Request::Write(_) if self.link.raw() => Some(Err(Refusal::NotNow)),
+            Request::Write(Value::Parameters(parameters)) if !parameters.method.available() => {
+                Some(Err(Refusal::Unsupported))
+            }
             Request::Write(value) => {
                 self.keeping = Some(value);
                 None

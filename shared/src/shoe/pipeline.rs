@@ -37,12 +37,10 @@ impl Pipeline {
     }
 
     /// As new, with other values.
-    // Apart, and one part after the other: built at once, in the frame of a loop, they would take 18 kB of its stack for ever.
-    #[inline(never)]
     pub fn restart(&mut self, sensor: &Config, parameters: &Parameters, calibration: &Calibration) {
-        self.merger = Merger::new(sensor);
+        self.merger.restart(sensor);
         self.calibration = *calibration;
-        self.tracker = Tracker::new(parameters);
+        self.tracker.restart(parameters);
     }
 
     /// Carries an order out; whether it could be.

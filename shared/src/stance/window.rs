@@ -35,9 +35,10 @@ impl<const CHANNELS: usize, const CAPACITY: usize> Window<CHANNELS, CAPACITY> {
     /// The minimum keeps a variance meaningful where the samples are as far apart as the window is long.
     pub fn over(seconds: f32, minimum: usize) -> Self {
         const { assert!(CAPACITY > 0 && CAPACITY < 1024, "the sums hold 1 to 1023 samples") };
+        let (length_us, minimum) = Self::extent(seconds, minimum);
         Self {
-            length_us: (seconds * 1e6) as i64,
-            minimum: minimum.clamp(1, CAPACITY),
+            length_us,
+            minimum,
             times: [Micros(0); CAPACITY],
             values: [[0; CHANNELS]; CAPACITY],
             sums: [0; CHANNELS],
@@ -51,6 +52,16 @@ impl<const CHANNELS: usize, const CAPACITY: usize> Window<CHANNELS, CAPACITY> {
     /// An empty window over the last `CAPACITY` samples, however long they took.
     pub fn of_newest() -> Self {
         Self::over(f32::MAX, CAPACITY)
+    }
+
+    fn extent(seconds: f32, minimum: usize) -> (i64, usize) {
+        ((seconds * 1e6) as i64, minimum.clamp(1, CAPACITY))
+    }
+
+    /// As a new one of [`Window::over`], in its place.
+    pub fn restart(&mut self, seconds: f32, minimum: usize) {
+        (self.length_us, self.minimum) = Self::extent(seconds, minimum);
+        self.clear();
     }
 
     /// Forgets every sample.

@@ -11,6 +11,8 @@ mod documented;
 pub mod ground;
 mod own;
 pub mod stride;
+#[cfg(feature = "documented")]
+mod way;
 
 use crate::filter::pivot;
 use crate::preintegration;
@@ -19,9 +21,11 @@ use crate::sample::ImuSample;
 use crate::stance::adaptive;
 use crate::step::{FloorMode, Step};
 use crate::time::Micros;
-use documented::Documented;
 use nalgebra::{UnitQuaternion, Vector3};
-use own::Own;
+#[cfg(not(feature = "documented"))]
+use own::Own as Way;
+#[cfg(feature = "documented")]
+use way::Way;
 
 /// The way from samples to steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,8 +35,16 @@ pub enum Method {
     /// The project's own: increments, adaptive detector, pivot filter.
     #[default]
     Pivot,
-    /// The document's: an unscented filter on each sample, and one of the detectors by threshold.
+    /// The document's: an unscented filter on each sample, and one of the detectors by threshold. Of the feature
+    /// `documented`.
     Unscented,
+}
+
+impl Method {
+    /// Whether this program has it. A tracker that is told to use one that it does not have uses its own.
+    pub fn available(self) -> bool {
+        self == Self::Pivot || cfg!(feature = "documented")
+    }
 }
 
 /// The detector of [`Method::Unscented`].
@@ -181,31 +193,23 @@ pub struct Tracker {
     last: Option<Micros>,
 }
 
-#[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "without a heap the larger one cannot be boxed, and there is one tracker"
-)]
-enum Way {
-    Own(Own),
-    Documented(Documented),
-}
-
 impl Tracker {
     /// A tracker in state RESET.
     pub fn new(parameters: &Parameters) -> Self {
-        let way = match parameters.method {
-            Method::Pivot => Way::Own(Own::new(parameters)),
-            Method::Unscented => Way::Documented(Documented::new(parameters)),
-        };
-        Self { parameters: *parameters, way, counters: Counters::default(), last: None }
+        Self { parameters: *parameters, way: Way::new(parameters), counters: Counters::default(), last: None }
     }
 
     /// Back to RESET, as new. What a map commanded is forgotten too.
-    // Apart: in the frame of who calls it in a loop, the new one would take 13 kB of the stack for ever.
-    #[inline(never)]
     pub fn reset(&mut self) {
-        *self = Self::new(&self.parameters);
+        self.way.reset(&self.parameters);
+        self.counters = Counters::default();
+        self.last = None;
+    }
+
+    /// As new, with other settings.
+    pub fn restart(&mut self, parameters: &Parameters) {
+        self.parameters = *parameters;
+        self.reset();
     }
 
     /// Takes one sample in. Never panics; a sample that cannot be used is counted and changes nothing.
@@ -217,10 +221,7 @@ impl Tracker {
         self.last = Some(sample.time);
         self.counters.accel_clipped += u32::from(sample.clipped.accel);
         self.counters.gyro_clipped += u32::from(sample.clipped.gyro);
-        match &mut self.way {
-            Way::Own(own) => own.push(sample, &mut self.counters),
-            Way::Documented(documented) => documented.push(sample, &mut self.counters),
-        }
+        self.way.push(sample, &mut self.counters)
     }
 
     fn usable(&mut self, sample: &ImuSample) -> bool {
@@ -238,36 +239,24 @@ impl Tracker {
 
     /// Ends the recording: the step of a stance that has not ended yet.
     pub fn finish(&mut self) -> Option<Step> {
-        match &mut self.way {
-            Way::Own(own) => own.finish(&mut self.counters),
-            Way::Documented(documented) => documented.finish(&mut self.counters),
-        }
+        self.way.finish(&mut self.counters)
     }
 
     /// Tells what the ground does, as a map knows it (H4, H5); `None` leaves it to the tracker again.
     pub fn command_floor_mode(&mut self, mode: Option<FloorMode>) {
-        match &mut self.way {
-            Way::Own(own) => own.command(mode),
-            Way::Documented(documented) => documented.command(mode),
-        }
+        self.way.command(mode);
     }
 
     /// Back to INIT: attitude, velocity and biases are found anew at the next rest. The steps go on counting, the next one
     /// carries the mark of a gap, and what a map commanded still holds.
     pub fn initialise(&mut self) {
-        match &mut self.way {
-            Way::Own(own) => own.initialise(self.last),
-            Way::Documented(documented) => documented.initialise_anew(),
-        }
+        self.way.initialise(self.last);
     }
 
     /// Starts from the next stance, without waiting for a rest. Whether it could: not in state TRACKING, and not with
     /// [`Method::Unscented`], whose filter needs a rest.
     pub fn start_moving(&mut self) -> bool {
-        match &mut self.way {
-            Way::Own(own) => own.start_moving(),
-            Way::Documented(_) => false,
-        }
+        self.way.start_moving()
     }
 
     /// Carries an order out. Whether it could be in the present state; if not, nothing has changed.
@@ -283,10 +272,7 @@ impl Tracker {
 
     /// What the tracker is doing.
     pub fn state(&self) -> State {
-        match &self.way {
-            Way::Own(own) => own.phase(),
-            Way::Documented(documented) => documented.phase(),
-        }
+        self.way.phase()
     }
 
     /// What was unusual since the reset.
@@ -295,10 +281,7 @@ impl Tracker {
     }
 
     fn foot(&self) -> &crate::filter::state::State {
-        match &self.way {
-            Way::Own(own) => own.foot(),
-            Way::Documented(documented) => documented.foot(),
-        }
+        self.way.foot()
     }
 
     /// Where the foot is now, since the stance of the last step. **Units:** m; **Frame:** heading frame of that stance, as
@@ -468,6 +451,26 @@ mod tests {
         // A stride of this walk takes a second.
         assert!(started(true).is_some_and(|after| after < 1_500_000), "{:?}", started(true));
         assert!(started(false).is_none_or(|after| after > 5_000_000), "{:?}", started(false));
+    }
+
+    #[test]
+    fn a_tracker_that_starts_over_is_a_new_one() {
+        let calm = Parameters {
+            start_after_s: 1.0,
+            rest: rest::Parameters { window_s: 0.3, ..Default::default() },
+            ..Default::default()
+        };
+        for parameters in [Parameters::default(), calm, Parameters::documented()] {
+            let (mut new, mut used) = (Tracker::new(&parameters), Tracker::new(&Parameters::default()));
+            used.command_floor_mode(Some(FloorMode::Stairs));
+            walk().iter().take(2_500).for_each(|sample| _ = used.push(sample));
+            used.restart(&parameters);
+            for sample in walk() {
+                assert_eq!(used.push(&sample), new.push(&sample), "{parameters:?}");
+                assert_eq!((used.displacement(), used.counters()), (new.displacement(), new.counters()));
+            }
+            assert_eq!(used.finish(), new.finish());
+        }
     }
 
     #[test]

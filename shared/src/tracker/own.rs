@@ -72,6 +72,39 @@ impl Own {
         }
     }
 
+    /// As new. Part by part: a new one at once would take 5 kB of the stack, twice.
+    pub(super) fn reset(&mut self, p: &Parameters) {
+        let Self {
+            start_after_s,
+            swing_speed,
+            preintegrator,
+            ring,
+            detector,
+            rest,
+            filter,
+            ground,
+            steps,
+            state,
+            waiting_since,
+            impatient,
+            repaired,
+            stance,
+        } = self;
+        (*start_after_s, *swing_speed) = (p.start_after_s, p.stance.swing_speed);
+        *preintegrator = Preintegrator::new(&p.preintegration);
+        *ring = [None; 2];
+        *detector = Adaptive::new(&p.stance);
+        rest.restart(&p.rest);
+        filter.restart(&p.filter);
+        *ground = Ground::new(&p.ground);
+        *steps = StepBuilder::new(&p.steps);
+        *state = State::Reset;
+        *waiting_since = None;
+        *impatient = false;
+        *repaired = 0;
+        *stance = false;
+    }
+
     pub(super) fn command(&mut self, mode: Option<FloorMode>) {
         self.ground.command(mode);
     }
