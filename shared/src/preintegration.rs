@@ -66,6 +66,8 @@ pub struct Increment {
     pub clipped: ClippedSamples,
     /// The increment is a hole in the samples, and nothing is known of it but its length.
     pub gap: bool,
+    /// It begins with a hole in which the foot set out from a rest.
+    pub sets_out: bool,
 }
 
 impl Increment {
@@ -87,6 +89,7 @@ impl Increment {
             gyro_clipped: 0.0,
             clipped: ClippedSamples::default(),
             gap: false,
+            sets_out: false,
         }
     }
 
@@ -112,18 +115,30 @@ pub struct Preintegrator {
     parameters: Parameters,
     last: Option<ImuSample>,
     current: Option<Increment>,
+    stood: bool,
 }
 
 impl Preintegrator {
     /// Nothing gathered yet.
     pub fn new(parameters: &Parameters) -> Self {
-        Self { parameters: *parameters, last: None, current: None }
+        Self { parameters: *parameters, last: None, current: None, stood: false }
+    }
+
+    /// No samples came because the sensor did not move, until `time`: its last sample holds until then, and the foot sets out
+    /// from there. Without a sample, or when the last one is as late, nothing changes.
+    pub fn stood_until(&mut self, time: Micros) {
+        if let Some(last) = self.last.as_mut().filter(|last| last.time < time) {
+            last.time = time;
+            self.current = None;
+            self.stood = true;
+        }
     }
 
     /// Takes a sample in that is later than the one before, and hands out the increment it completes. The first sample
     /// only starts the clock.
     pub fn push(&mut self, sample: &ImuSample, gyro_bias: GyroBias, accel_bias: AccelBias) -> Option<Increment> {
         let last = self.last.replace(*sample)?;
+        let sets_out = core::mem::take(&mut self.stood);
         let dt = sample.time.since(last.time);
         if dt > self.parameters.gap_s {
             let start = self.current.take().map_or(last.time, |unfinished| unfinished.start);
@@ -147,6 +162,7 @@ impl Preintegrator {
         increment.position += increment.velocity * dt + (before * 2.0 + after) * (dt * dt / 6.0);
         increment.velocity += (before + after) * (0.5 * dt);
 
+        increment.sets_out |= sets_out;
         increment.end = sample.time;
         increment.samples = increment.samples.saturating_add(1);
         increment.accel_sum += accel;

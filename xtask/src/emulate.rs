@@ -43,6 +43,14 @@ const RECORDINGS: [(&str, Option<&str>, u32); 2] =
     [("foot_xio/short_walk.csv", None, 46), ("foot_gaitmap/imu_sample.csv", Some("gaitmap-left"), 45)];
 /// How long the simulated walk lasts in the check. **Units:** s.
 const SIMULATED_S: u32 = 40;
+/// The walk of that check, 4 s of rest before and after it included; from then on the foot stands. **Units:** s.
+const SHORT_S: u32 = 24;
+/// In the check of its sleep the shoe sleeps when it has stood so long. **Units:** s.
+const SLEEP_AFTER_S: u32 = 3;
+/// After that walk: to fall asleep, and to tell twice of it. **Units:** s.
+const ASLEEP_S: u32 = SLEEP_AFTER_S + 15;
+/// Instructions of the emulated processor in a second, by [`SHIFT`].
+const INSTRUCTIONS_PER_S: f64 = 62.5e6;
 /// A walk takes as long as it takes; this is for one that hangs.
 const LIMIT: Duration = Duration::from_secs(180);
 
@@ -142,6 +150,9 @@ struct Summary {
     load: Option<u32>,
     stack: Option<u32>,
     waiting: Option<u32>,
+    load_max: u32,
+    asleep: Option<bool>,
+    sleeps: Option<u32>,
 }
 
 /// The bits of the emulated processor against this one's, and a walk over a bad line.
@@ -171,7 +182,7 @@ pub fn check() -> Result<(), Failure> {
         }
         let port = free_port()?;
         let running = Running::start(port, &counts)?;
-        let summary = live_walk(&sohle, port, *seconds, Some(&live))?;
+        let summary = live_walk(&sohle, port, *seconds, Some(&live), None)?;
         drop(running);
         row(name, &summary);
         if summary.frames_bad > 0 || summary.steps == 0 {
@@ -183,7 +194,43 @@ pub fn check() -> Result<(), Failure> {
         println!("  {}", told.ok_or_else(|| Failure::Found(format!("{name}: nothing was computed again")))?);
     }
     let (_, walk, profile, seconds) = &walks[0];
-    over_a_bad_line(&sohle, &converted(&sohle, &folder, walk, *profile)?, *seconds)
+    over_a_bad_line(&sohle, &converted(&sohle, &folder, walk, *profile)?, *seconds)?;
+    let walk = folder.join("short.mcap");
+    let mut command = Command::new(&sohle);
+    command.args(["simulate", "--gait", "walk", "--strides", "10", "--out"]).arg(&walk);
+    process::read(&mut command)?;
+    asleep(&sohle, &folder, &converted(&sohle, &folder, &walk, None)?)
+}
+
+/// A short walk with a sensor that sleeps soon: the shoe must sleep before and after it, and miss no step. What
+/// the processor does then goes to the twin's readings for the most part, which no real board has to make.
+fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<(), Failure> {
+    let parameters = |seconds: u32| {
+        let path = folder.join("parameters.toml");
+        let text = format!("sleep_after_s = {seconds}.0\n");
+        std::fs::write(&path, text).map_err(|source| file(&path, source)).map(|()| path)
+    };
+    let walk = |sleep_after_s, seconds| {
+        let parameters = parameters(sleep_after_s)?;
+        let port = free_port()?;
+        let running = Running::start(port, counts)?;
+        let summary = live_walk(sohle, port, seconds, None, Some(&parameters))?;
+        drop(running);
+        Ok::<_, Failure>(summary)
+    };
+    let awake = walk(0, SHORT_S)?;
+    let slept = walk(SLEEP_AFTER_S, SHORT_S + ASLEEP_S)?;
+    row("ten strides, awake", &awake);
+    row("the same, asleep before and after", &slept);
+    let instructions = |load: u32| f64::from(load) * 1e-3 * INSTRUCTIONS_PER_S * 1e-6;
+    let (busy, idle) = (instructions(slept.load_max), instructions(slept.load.unwrap_or_default()));
+    let sleeps = slept.sleeps.unwrap_or_default();
+    println!("  it slept {sleeps} times; {busy:.1} million instructions a second at most, {idle:.2} million asleep");
+    if slept.asleep != Some(true) || slept.steps != awake.steps || sleeps == 0 || slept.lost + slept.doubled > 0 {
+        let (steps, all) = (slept.steps, awake.steps);
+        return Err(Failure::Found(format!("it slept {sleeps} times, and of {all} steps {steps} came")));
+    }
+    Ok(())
 }
 
 /// The first walk over a line that damages bytes and loses pieces, both ways: every step must arrive, once.
@@ -193,7 +240,7 @@ fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<(), Fail
     let proxy =
         Proxy::start(laptop, shoe).map_err(|source| Failure::NotStarted { program: "the bad line".into(), source })?;
     // Time for what is sent again, and for an emulator that does not keep up.
-    let summary = live_walk(sohle, laptop, seconds + 15, None)?;
+    let summary = live_walk(sohle, laptop, seconds + 15, None, None)?;
     let (damaged, lost) = proxy.faults();
     drop(running);
     row("the first over a bad line", &summary);
@@ -221,14 +268,23 @@ fn row(name: &str, summary: &Summary) {
     );
 }
 
-/// `sohle live` for so long; with the sensor's counts if they are to be recorded.
-fn live_walk(sohle: &Path, port: u16, seconds: u32, record: Option<&Path>) -> Result<Summary, Failure> {
+/// `sohle live` for so long; with the sensor's counts if they are to be recorded, and with these settings.
+fn live_walk(
+    sohle: &Path,
+    port: u16,
+    seconds: u32,
+    record: Option<&Path>,
+    parameters: Option<&Path>,
+) -> Result<Summary, Failure> {
     let mut command = Command::new(sohle);
     command.args(["live", &format!("tcp:127.0.0.1:{port}"), "--for", &seconds.to_string(), "--format", "json", "-q"]);
     match record {
         Some(path) => command.arg("--raw").arg("--out").arg(path),
         None => command.arg("--no-record"),
     };
+    if let Some(path) = parameters {
+        command.arg("--parameters").arg(path);
+    }
     let said = process::read_within(&mut command, LIMIT)?;
     let last = said.out.lines().last().unwrap_or_default();
     serde_json::from_str(last).map_err(|error| Failure::Found(format!("sohle live said '{last}': {error}")))

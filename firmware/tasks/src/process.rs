@@ -1,6 +1,6 @@
 //! Makes steps of what was read, and talks to the laptop.
 
-use crate::traffic::Traffic;
+use crate::traffic::{Sensed, Traffic};
 use crate::{instant, now};
 use core::borrow::BorrowMut;
 use embassy_futures::select::{Either4, select4};
@@ -15,6 +15,9 @@ use sohle_shared::wire::transfer::Value;
 
 /// While the line is full, it is asked again so often. **Units:** microseconds.
 const LINE_FULL_US: i64 = 2_000;
+
+/// While the sensor sleeps, every so manieth second has a status.
+const ASLEEP_S: u32 = 5;
 
 /// What a board knows of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,7 +36,7 @@ pub struct BoardHealth {
 pub trait Board {
     /// Keeps a value over a loss of power.
     fn keep(&mut self, value: &Value) -> impl Future<Output = Result<(), Refusal>>;
-    /// How it is; asked once in a second.
+    /// How it is; asked once in a second, asleep every five seconds.
     fn health(&mut self) -> BoardHealth;
     /// All loops live: the watchdog may be fed. Called once in a second.
     fn alive(&mut self);
@@ -50,20 +53,29 @@ pub async fn process<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>>(
     let mut bytes = [0; 128];
     let mut lateness = 0;
     let (mut rounds, mut lost) = (traffic.rounds(), traffic.lost());
+    // Seconds since the last status, and what the sensor was asked since.
+    let (mut quiet_s, mut asked) = (0, None);
     loop {
         let due = transmit(traffic, shoe);
-        match select4(traffic.batches.receive(), line.read(&mut bytes), Timer::at(instant(due)), seconds.next()).await {
-            Either4::First(batch) => {
+        match select4(traffic.sensed.receive(), line.read(&mut bytes), Timer::at(instant(due)), seconds.next()).await {
+            Either4::First(Sensed::Batch(batch)) => {
                 shoe.sensed(&batch);
                 lateness = lateness.max(now() - batch.stamp);
+            }
+            Either4::First(Sensed::Asleep) => {
+                shoe.fell_asleep();
+                quiet_s = ASLEEP_S;
+            }
+            Either4::First(Sensed::Woken(time)) => {
+                shoe.woke(time);
+                quiet_s = ASLEEP_S;
             }
             Either4::Second(Ok(length)) => shoe.received(bytes.get(..length).unwrap_or_default(), now()),
             Either4::Second(Err(_)) => shoe.log(now(), Level::Warn, "serial line: bytes were lost"),
             Either4::Third(()) => {}
             Either4::Fourth(()) => {
                 let time = now();
-                shoe.report(time, &health(traffic, board.health(), lateness));
-                lateness = 0;
+                (quiet_s, asked) = (quiet_s + 1, None);
                 if traffic.lost() != lost {
                     lost = traffic.lost();
                     shoe.log(time, Level::Error, "the tracker was too late: samples were lost");
@@ -74,9 +86,18 @@ pub async fn process<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>>(
                 }
             }
         }
+        if quiet_s >= if shoe.asleep() { ASLEEP_S } else { 1 } {
+            shoe.report(now(), &health(traffic, board.health(), lateness));
+            (quiet_s, lateness) = (0, 0);
+        }
         if let Some(value) = shoe.keep().copied() {
             let result = board.keep(&value).await;
             shoe.kept(result);
+        }
+        let drowsy = shoe.drowsy();
+        if drowsy != shoe.asleep() && asked != Some(drowsy) {
+            traffic.rest.signal(drowsy);
+            asked = Some(drowsy);
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Reads the sensor.
 
-use crate::traffic::Traffic;
+use crate::traffic::{Sensed, Traffic};
 use crate::{instant, now};
 use core::future::pending;
-use embassy_futures::select::{Either3, select3};
+use embassy_futures::select::{Either4, select4};
 use embassy_time::Timer;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::digital::Wait;
@@ -18,6 +18,8 @@ const PIN_REST_US: i64 = 1_000;
 /// Sets the sensor up, reads both FIFOs when they tell of it, and mends what breaks, for ever.
 ///
 /// The watermark pins are high as long as a FIFO is filled above its mark, so none is missed while the other die is read.
+/// When [`process`](crate::process()) wants it, the sensor sleeps: the loop then waits for the pin of the accelerometer, which
+/// tells of motion, for the driver's look once in a second, and for who wants it awake.
 pub async fn sense<ACCEL, GYRO, MAG, DELAY>(
     traffic: &Traffic,
     mut driver: Bmx055<ACCEL, GYRO, MAG, DELAY>,
@@ -31,23 +33,31 @@ where
     DELAY: DelayNs,
 {
     let mut read = [Micros(0); 2];
+    let mut asleep = false;
     loop {
         let running = [Die::Accel, Die::Gyro].map(|die| driver.state(die) == State::Run);
-        let accel = marked(&mut accel_pin, running[0], read[0]);
+        let accel = marked(&mut accel_pin, running[0] || asleep, read[0]);
         let gyro = marked(&mut gyro_pin, running[1], read[1]);
-        let woken = select3(accel, gyro, Timer::at(instant(driver.due()))).await;
+        let woken = select4(accel, gyro, Timer::at(instant(driver.due())), traffic.rest.wait()).await;
         let time = now();
         let sink = |batch: &_| traffic.offer(batch);
         match woken {
-            Either3::First(()) => {
+            Either4::First(()) => {
                 driver.on_watermark(Die::Accel, time, sink).await;
                 read[0] = time;
             }
-            Either3::Second(()) => {
+            Either4::Second(()) => {
                 driver.on_watermark(Die::Gyro, time, sink).await;
                 read[1] = time;
             }
-            Either3::Third(()) => driver.poll(time, sink).await,
+            Either4::Third(()) => driver.poll(time, sink).await,
+            Either4::Fourth(true) => _ = driver.sleep(time).await,
+            Either4::Fourth(false) => driver.wake(time),
+        }
+        if driver.asleep() != asleep {
+            asleep = !asleep;
+            // The queue has room: asleep, nothing comes into it, and before, a batch at a time.
+            traffic.sensed.send(if asleep { Sensed::Asleep } else { Sensed::Woken(time) }).await;
         }
         traffic.tell([*driver.counters(Die::Accel), *driver.counters(Die::Gyro)]);
     }

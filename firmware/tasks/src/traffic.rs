@@ -5,18 +5,33 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::pipe::Pipe;
+use embassy_sync::signal::Signal;
 use embedded_io_async::Write;
 use portable_atomic::{AtomicU32, Ordering};
 use sohle_shared::bmx055::{Batch, DieCounters};
+use sohle_shared::time::Micros;
 
 /// Batches that may wait for [`process`](crate::process()): both dies fill 250 in a second.
 const BATCHES: usize = 26;
 /// Bytes that may wait for the line: 22 ms at 921 600 baud.
 const BYTES: usize = 2_048;
 
+/// What [`sense`](crate::sense()) tells.
+#[expect(clippy::large_enum_variant, reason = "there is no heap on the shoe, and nearly all are batches")]
+pub(crate) enum Sensed {
+    /// A die was read.
+    Batch(Batch),
+    /// The sensor was put to sleep.
+    Asleep,
+    /// It was woken at this time.
+    Woken(Micros),
+}
+
 /// What passes between the loops. One, in a `static`.
 pub struct Traffic {
-    pub(crate) batches: Channel<CriticalSectionRawMutex, Batch, BATCHES>,
+    pub(crate) sensed: Channel<CriticalSectionRawMutex, Sensed, BATCHES>,
+    /// Whether the sensor is to sleep.
+    pub(crate) rest: Signal<CriticalSectionRawMutex, bool>,
     pub(crate) bytes: Pipe<CriticalSectionRawMutex, BYTES>,
     counters: Mutex<CriticalSectionRawMutex, Cell<[DieCounters; 2]>>,
     /// Batches that found the queue full.
@@ -29,7 +44,8 @@ impl Traffic {
     /// Nothing waits.
     pub const fn new() -> Self {
         Self {
-            batches: Channel::new(),
+            sensed: Channel::new(),
+            rest: Signal::new(),
             bytes: Pipe::new(),
             counters: Mutex::new(Cell::new([DieCounters::NONE; 2])),
             lost: AtomicU32::new(0),
@@ -39,7 +55,7 @@ impl Traffic {
 
     /// Queues a batch; without room it is lost and counted, and the tracker sees a gap.
     pub(crate) fn offer(&self, batch: &Batch) {
-        if self.batches.try_send(batch.clone()).is_err() {
+        if self.sensed.try_send(Sensed::Batch(batch.clone())).is_err() {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -51,7 +67,11 @@ impl Traffic {
 
     /// The next batch that was read, for who looks at them without a shoe.
     pub async fn receive(&self) -> Batch {
-        self.batches.receive().await
+        loop {
+            if let Sensed::Batch(batch) = self.sensed.receive().await {
+                return batch;
+            }
+        }
     }
 
     /// Of accelerometer and gyroscope.

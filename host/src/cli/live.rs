@@ -180,6 +180,7 @@ struct Show {
     raw_lost: u64,
     raw_next: u32,
     status: Option<Status>,
+    load_max: u16,
     fault: Option<String>,
 }
 
@@ -242,7 +243,9 @@ impl Show {
                 FromShoe::Log(log)
             }
             Event::Reply { .. } => return,
-            Event::Silent => return self.say("nothing was heard of the shoe for 3 s"),
+            Event::Asleep => return self.say("the shoe stands still and is asleep"),
+            Event::Woken => return self.say("the shoe has woken"),
+            Event::Silent => return self.say("nothing is heard of the shoe any more"),
             Event::Back => return self.say("the shoe is heard again"),
         };
         if let Some(recorder) = &mut self.recorder {
@@ -279,6 +282,7 @@ impl Show {
     /// Tells what went wrong on the shoe since the status before.
     fn status(&mut self, status: &Status) {
         let before = self.status.replace(*status);
+        self.load_max = self.load_max.max(status.load);
         let counts = |status: &Status| {
             [
                 ("accelerometer FIFO overruns", status.accel.overruns),
@@ -332,6 +336,8 @@ impl Show {
                     "raw_lost": self.raw_lost, "waiting": self.status.map(|status| status.waiting),
                     "load": self.status.map(|status| status.load), "stack": self.status.map(|status| status.stack),
                     "lateness_us": self.status.map(|status| status.lateness_us),
+                    "load_max": self.load_max,
+                    "asleep": self.status.map(|status| status.asleep), "sleeps": self.status.map(|status| status.sleeps),
                 })
             ))?,
             Format::Table => {

@@ -50,7 +50,11 @@ pub enum Event {
         /// What became of it.
         outcome: Outcome,
     },
-    /// Nothing was heard for three seconds.
+    /// The foot stands still, and the sensor sleeps: until it wakes, little is heard of the shoe.
+    Asleep,
+    /// The sensor was woken, by motion or by a command.
+    Woken,
+    /// Nothing was heard for three seconds, or sixteen of a shoe that sleeps.
     Silent,
     /// Something was heard again.
     Back,

@@ -28,6 +28,8 @@ const COMMAND_US: i64 = 300_000;
 const COMMAND_TRIES: u32 = 4;
 /// Nothing was heard for so long.
 const SILENCE_US: i64 = 3_000_000;
+/// The same for a shoe that sleeps: it tells every five seconds that it does.
+const SILENCE_ASLEEP_US: i64 = 16_000_000;
 /// Boots of the shoe whose steps are told apart.
 const BOOTS: usize = 16;
 
@@ -84,6 +86,8 @@ pub struct Session {
     tries: u32,
     heard: Option<Micros>,
     silent: bool,
+    /// The shoe said last that its sensor sleeps.
+    asleep: bool,
 }
 
 impl Session {
@@ -113,6 +117,7 @@ impl Session {
             tries: 0,
             heard: None,
             silent: false,
+            asleep: false,
         }
     }
 
@@ -146,7 +151,13 @@ impl Session {
                 }
                 FromShoe::Raw(raw) => self.events.push_back(Event::Raw(raw)),
                 FromShoe::Attitude(attitude) => self.events.push_back(Event::Attitude(attitude)),
-                FromShoe::Status(status) => self.events.push_back(Event::Status(status)),
+                FromShoe::Status(status) => {
+                    if status.asleep != self.asleep {
+                        self.asleep = status.asleep;
+                        self.events.push_back(if status.asleep { Event::Asleep } else { Event::Woken });
+                    }
+                    self.events.push_back(Event::Status(status));
+                }
                 FromShoe::Log(log) => self.events.push_back(Event::Log(log)),
             }
         }
@@ -156,7 +167,7 @@ impl Session {
         self.now = now;
         self.clock.advance(now);
         let heard = *self.heard.get_or_insert(now);
-        if !self.silent && now - heard >= SILENCE_US {
+        if !self.silent && now - heard >= self.silence_us() {
             self.silent = true;
             self.events.push_back(Event::Silent);
         }
@@ -194,7 +205,7 @@ impl Session {
                 None => self.meet(hello.boot, current.is_some()),
             }
             self.clock = Clock::default();
-            (self.greeted, self.ack_due) = (false, None);
+            (self.greeted, self.ack_due, self.asleep) = (false, None, false);
             self.questions.forget();
         }
         self.refused = None;
@@ -325,10 +336,15 @@ impl Session {
     pub fn deadline(&self, now: Micros) -> Micros {
         let silence = match (self.silent, self.heard) {
             (true, _) => None,
-            (false, heard) => Some(heard.unwrap_or(now) + SILENCE_US),
+            (false, heard) => Some(heard.unwrap_or(now) + self.silence_us()),
         };
         let due = [self.hello_due, self.ack_due, self.question_due(), self.command_due(), silence];
         due.into_iter().flatten().min().map_or(Micros(i64::MAX), |due| due.max(now))
+    }
+
+    /// Who says nothing for so long is silent. **Units:** microseconds.
+    fn silence_us(&self) -> i64 {
+        if self.asleep { SILENCE_ASLEEP_US } else { SILENCE_US }
     }
 
     /// The line was opened anew: half a frame is forgotten and hello is said again.
@@ -364,7 +380,7 @@ mod tests {
     use sohle_shared::calibration::Calibration;
     use sohle_shared::tracker::{Order, Parameters};
     use sohle_shared::wire::link::{Identity, Link, Request, ToShoeDecoder};
-    use sohle_shared::wire::message::{Ack, Outcome, TimeReply};
+    use sohle_shared::wire::message::{Ack, Outcome, Status, TimeReply};
     use sohle_shared::wire::outbox::{Outbox, Pace};
 
     const SESSION: u32 = 77;
@@ -601,6 +617,26 @@ mod tests {
         assert_eq!(events(&mut session), [], "garbage is nothing");
         hear(&mut session, &sent(1, 0), 10_001);
         assert!(matches!(events(&mut session)[..], [Event::Back, Event::Step { .. }]));
+    }
+
+    #[test]
+    fn a_shoe_that_sleeps_is_not_silent_and_one_that_is_gone_is() {
+        let mut session = connected();
+        let status = |asleep| Status { asleep, ..Status::default() };
+        hear(&mut session, &FromShoe::Status(status(false)), 900);
+        hear(&mut session, &FromShoe::Status(status(true)), 1_000);
+        let told = events(&mut session);
+        assert_eq!(told, [Event::Status(status(false)), Event::Asleep, Event::Status(status(true))]);
+        // Two of three are lost.
+        all_said(&mut session, 1_000, 16_000);
+        hear(&mut session, &FromShoe::Status(status(true)), 16_000);
+        assert_eq!(events(&mut session), [Event::Status(status(true))]);
+        hear(&mut session, &FromShoe::Status(status(false)), 17_000);
+        assert_eq!(events(&mut session), [Event::Woken, Event::Status(status(false))]);
+        hear(&mut session, &FromShoe::Status(status(true)), 18_000);
+        all_said(&mut session, 18_000, 40_000);
+        let told = events(&mut session);
+        assert_eq!(told, [Event::Asleep, Event::Status(status(true)), Event::Silent]);
     }
 
     #[test]

@@ -20,6 +20,8 @@ pub enum State {
     Configure,
     /// It delivers frames.
     Run,
+    /// It delivers nothing, to save power.
+    Asleep,
     /// It could not be reset or set up; tried again after a while.
     Fault,
 }
@@ -39,6 +41,9 @@ const BOOT_MARGIN_US: i64 = 1_200;
 
 /// Wait after a write, 2 us by the data sheet (BMI088, table 12). **Units:** microseconds.
 pub(super) const WRITE_US: u32 = 5;
+
+/// The same for a die that sleeps then, 450 us by the data sheet (BMI088, table 13). **Units:** microseconds.
+pub(super) const ASLEEP_US: u32 = 500;
 
 /// Bytes of a frame.
 const FRAME: usize = 6;
@@ -157,6 +162,18 @@ impl<SPI> Channel<SPI> {
         self.counters.restarts = self.counters.restarts.saturating_add(1);
     }
 
+    /// It was told to sleep, and is looked at next at `due`.
+    pub fn doze(&mut self, due: Micros) {
+        (self.state, self.due, self.overdue) = (State::Asleep, due, Micros(i64::MAX));
+    }
+
+    /// Ends the sleep: the die is set up anew. Its frames go on after a gap.
+    pub fn wake(&mut self, now: Micros) {
+        let restarts = self.counters.restarts;
+        self.restart(now);
+        self.counters.restarts = restarts;
+    }
+
     /// Counts what went wrong.
     pub fn count(&mut self, error: Error) {
         let counter = match error {
@@ -214,6 +231,7 @@ impl<SPI: SpiDevice> Channel<SPI> {
                 self.overdue = now + self.patience_us;
             }
             State::Run => self.run(now, temperature, delay, sink).await,
+            State::Asleep => {}
             State::Fault => self.restart(now),
         }
     }
@@ -232,14 +250,20 @@ impl<SPI: SpiDevice> Channel<SPI> {
     async fn configure(&mut self, delay: &mut impl DelayNs) -> Result<(), Error> {
         port::identify(&mut self.spi, both::CHIP_ID, self.id).await?;
         for setting in self.settings {
-            port::write(&mut self.spi, setting.register, setting.value).await?;
-            delay.delay_us(WRITE_US).await;
-            self.verify(setting).await?;
+            self.set(setting, WRITE_US, delay).await?;
         }
         Ok(())
     }
 
-    async fn verify(&mut self, setting: Setting) -> Result<(), Error> {
+    /// Writes a register and, `wait_us` later, reads it back. **Units:** microseconds.
+    pub async fn set(&mut self, setting: Setting, wait_us: u32, delay: &mut impl DelayNs) -> Result<(), Error> {
+        port::write(&mut self.spi, setting.register, setting.value).await?;
+        delay.delay_us(wait_us).await;
+        self.verify(setting).await
+    }
+
+    /// Whether a register holds what was written.
+    pub async fn verify(&mut self, setting: Setting) -> Result<(), Error> {
         let read = port::read_one(&mut self.spi, setting.register).await?;
         if (read ^ setting.value) & setting.mask == 0 {
             return Ok(());

@@ -17,6 +17,7 @@ use super::channel::{Channel, State};
 use super::config::Config;
 use super::port::{self, Error};
 use super::registers::{accel, mag};
+use super::sleep::Sleep;
 use crate::time::Micros;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::SpiDevice;
@@ -34,6 +35,7 @@ pub struct Bmx055<ACCEL, GYRO, MAG, DELAY> {
     pub(super) gyro: Channel<GYRO>,
     mag: MAG,
     pub(super) delay: DELAY,
+    pub(super) sleep: Sleep,
     temperature: Option<i8>,
     /// When the temperature is read next.
     temperature_due: Micros,
@@ -58,6 +60,7 @@ impl<ACCEL: SpiDevice, GYRO: SpiDevice, MAG: SpiDevice, DELAY: DelayNs> Bmx055<A
             gyro: Channel::gyro(gyro, &config.gyro),
             mag,
             delay,
+            sleep: Sleep::new(&config.accel),
             temperature: None,
             temperature_due: Micros(i64::MIN),
         }
@@ -71,6 +74,9 @@ impl<ACCEL: SpiDevice, GYRO: SpiDevice, MAG: SpiDevice, DELAY: DelayNs> Bmx055<A
 
     /// Does what is due at `now`. Frames of a FIFO whose interrupt did not come go to `sink`.
     pub async fn poll(&mut self, now: Micros, mut sink: impl FnMut(&Batch)) {
+        if self.asleep() && now >= self.accel.due() {
+            return self.look(now).await;
+        }
         self.accel.poll(now, self.temperature, &mut self.delay, &mut sink).await;
         self.gyro.poll(now, self.temperature, &mut self.delay, &mut sink).await;
         if self.accel.state() == State::Run && now >= self.temperature_due {
@@ -82,9 +88,11 @@ impl<ACCEL: SpiDevice, GYRO: SpiDevice, MAG: SpiDevice, DELAY: DelayNs> Bmx055<A
         }
     }
 
-    /// The watermark interrupt of a die came at `stamp`: its frames go to `sink`, a batch for each watermark.
+    /// The interrupt of a die came at `stamp`. It tells of the watermark: the frames go to `sink`, a batch for each watermark;
+    /// or, asleep, of motion: the dies wake.
     pub async fn on_watermark(&mut self, die: Die, stamp: Micros, mut sink: impl FnMut(&Batch)) {
         match die {
+            Die::Accel if self.asleep() => self.wake(stamp),
             Die::Accel => self.accel.on_watermark(stamp, self.temperature, &mut sink).await,
             Die::Gyro => self.gyro.on_watermark(stamp, self.temperature, &mut sink).await,
         }

@@ -5,6 +5,8 @@
 //! Everything that comes out of it is a [`Batch`]; the [`Merger`] finds out when its frames were taken, and makes of the
 //! batches of both dies the samples that the tracker takes.
 //!
+//! While the shoe stands, both can sleep until something moves ([`Bmx055::sleep`]).
+//!
 //! [`twin`] is the sensor without the sensor; [`blocking`] is for those whose bus is not asynchronous.
 
 pub mod batch;
@@ -19,6 +21,9 @@ mod port;
 pub mod registers;
 #[cfg(test)]
 mod rig;
+mod sleep;
+#[cfg(test)]
+mod sleep_tests;
 pub mod trial;
 pub mod twin;
 

@@ -63,6 +63,29 @@ pub mod accel {
     pub const INT_OUT: u8 = 0x20;
     /// Of [`INT_OUT`]: INT1 push-pull, high when active.
     pub const INT_OUT_INT1_HIGH: u8 = 0x01;
+    /// Of [`POWER`](super::both::POWER): sleeps, and wakes up for a reading each time the sleep of bits 4 to 1 is over.
+    pub const POWER_LOW: u8 = 0x40;
+    /// Of [`POWER`](super::both::POWER): sleeps for 10 ms.
+    pub const POWER_SLEEP_10_MS: u8 = 0x0A << 1;
+    /// Enables interrupts of motion.
+    pub const INT_EN_0: u8 = 0x16;
+    /// Of [`INT_EN_0`]: the slope of x, y or z.
+    pub const INT_EN_0_SLOPE: u8 = 0x07;
+    /// Maps interrupts of motion to pin INT1.
+    pub const INT_MAP_0: u8 = 0x19;
+    /// Of [`INT_MAP_0`].
+    pub const INT_MAP_0_SLOPE: u8 = 0x04;
+    /// How long an interrupt of motion lasts; bit 7 ends it.
+    pub const INT_LATCH: u8 = 0x21;
+    /// Of [`INT_LATCH`]: until it is ended.
+    pub const INT_LATCH_FOREVER: u8 = 0x0F;
+    /// Of [`INT_LATCH`]: ends it now; reads as 0.
+    pub const INT_LATCH_END: u8 = 0x80;
+    /// Bits 1 and 0: one more slope than this must lie above the threshold, one after the other.
+    pub const SLOPE_DURATION: u8 = 0x27;
+    /// Difference between one reading and the next on an axis that is motion when exceeded. **Units:** 4 counts: 3.91 mg
+    /// at ±2 g, 31.25 mg at ±16 g.
+    pub const SLOPE_THRESHOLD: u8 = 0x28;
     /// Watermark of the FIFO.
     pub const FIFO_WATERMARK: u8 = 0x30;
     /// Self-test: axis in bits 1 and 0 (1 is x), sign in bit 2, amplitude in bit 4.
@@ -83,6 +106,9 @@ pub mod gyro {
     pub const FIFO_DEPTH: usize = 100;
     /// The same in stream mode (4.9.4).
     pub const FIFO_DEPTH_STREAM: usize = 99;
+    /// Of [`POWER`](super::both::POWER): measures nothing and keeps its registers; takes no write but of this register and
+    /// of the reset (5.5.7).
+    pub const POWER_SUSPEND: u8 = 0x80;
     /// Enables interrupts (5.5.9).
     pub const INT_EN_0: u8 = 0x15;
     /// Of [`INT_EN_0`].

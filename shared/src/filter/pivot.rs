@@ -224,7 +224,8 @@ impl PivotFilter {
         let back = increment.turn.inverse().to_rotation_matrix();
         self.propagate(back.matrix(), &velocity_turn, &position_turn, &(rotation.matrix() * -dt), dt);
 
-        let jump = p.jump_s * p.jump_s;
+        let jump_s = if increment.sets_out { p.jump_s.max(SET_OUT * dt) } else { p.jump_s };
+        let jump = jump_s * jump_s;
         let gyro = p.gyro_noise * p.gyro_noise * dt
             + jump * increment.gyro_jump
             + p.gyro_clip_sigma * p.gyro_clip_sigma * increment.gyro_clipped;
@@ -232,6 +233,17 @@ impl PivotFilter {
             + jump * increment.accel_jump
             + p.accel_clip_sigma * p.accel_clip_sigma * increment.accel_clipped;
         self.add_noise(dt, gyro, accel);
+    }
+
+    /// Stands for a while, unseen: only the biases may have changed.
+    pub fn stand(&mut self, duration_s: f32) {
+        let p = self.parameters;
+        let duration_s = duration_s.clamp(0.0, LONGEST_REST_S);
+        for (first, noise) in [(GYRO_BIAS, p.gyro_bias_noise), (ACCEL_BIAS, p.accel_bias_noise)] {
+            for axis in first..first + 3 {
+                self.covariance[(axis, axis)] += noise * noise * duration_s;
+            }
+        }
     }
 
     /// A hole in the samples: the foot went on somehow.
@@ -545,6 +557,12 @@ const LEAST_SPREAD: f32 = 1e-3;
 const POSITION_NOISE: f32 = 1e-8;
 /// A hole hides no more than this: the foot comes to stand again. **Units:** s.
 const LONGEST_GAP_S: f32 = 2.0;
+
+/// When in an unseen time the foot set out is anyone's guess: standard deviation of an even spread. **Units:** 1, of that time.
+const SET_OUT: f32 = 0.29;
+
+/// A day: no bias drifts for longer. **Units:** s.
+const LONGEST_REST_S: f32 = 86_400.0;
 
 #[cfg(test)]
 mod tests {

@@ -5,7 +5,7 @@ use crate::bmx055::{Batch, Config, DieCounters};
 use crate::calibration::Calibration;
 use crate::sample::ImuSample;
 use crate::time::Micros;
-use crate::tracker::{Order, Output, Parameters, State, Tracker};
+use crate::tracker::{Output, Parameters, State, Tracker};
 use crate::wire::frame::{self, FRAME_MAX};
 use crate::wire::link::{Identity, Link, Request};
 use crate::wire::message::{Attitude, FromShoe, Level, Log, Raw, RawItem, Refusal, ResetReason, Status, text};
@@ -59,8 +59,13 @@ pub struct Shoe<const STEPS: usize, O = Outbox<STEPS>> {
     /// A value that takes effect when the board has kept it.
     keeping: Option<Value>,
     temperature: Option<i8>,
-    /// The foot was seen to move.
+    /// The foot was seen to move, or somebody wanted something.
     moved: Micros,
+    /// Time of the last sample.
+    seen: Micros,
+    asleep: bool,
+    /// Times the sensor was put to sleep.
+    sleeps: u16,
 }
 
 impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
@@ -87,6 +92,9 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             keeping: None,
             temperature: None,
             moved: Micros(0),
+            seen: Micros(0),
+            asleep: false,
+            sleeps: 0,
         }
     }
 
@@ -96,9 +104,10 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             self.record(RawItem::Batch(batch.clone()));
         }
         self.temperature = batch.temperature.or(self.temperature);
-        let Self { pipeline, link, attitude, attitude_due, moved, .. } = self;
+        let Self { pipeline, link, attitude, attitude_due, moved, seen, .. } = self;
         pipeline.push(batch, |sample, output, tracker| {
-            if !output.stance {
+            *seen = sample.time;
+            if !output.stance || tracker.rides() {
                 *moved = sample.time;
             }
             if let Some(step) = &output.step {
@@ -115,6 +124,7 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     pub fn received(&mut self, bytes: &[u8], now: Micros) {
         self.link.receive(bytes, now);
         while let Some(request) = self.link.request() {
+            self.moved = now;
             if let Some(result) = self.carry_out(request) {
                 self.link.answer(result);
             }
@@ -190,6 +200,8 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             battery: health.battery,
             stack: health.stack,
             reset: health.reset,
+            asleep: self.asleep,
+            sleeps: self.sleeps,
             waiting: u16::try_from(self.link.waiting()).unwrap_or(u16::MAX),
             accel: health.accel,
             gyro: health.gyro,
@@ -234,20 +246,32 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
         if pending && self.link.connected() { now } else { self.link.deadline(now) }
     }
 
-    /// Since when the foot has not moved, by the clock of the samples; the board may save power then.
-    pub fn still_since(&self) -> Option<Micros> {
-        (self.pipeline.tracker().state() == State::Tracking).then_some(self.moved)
+    /// Whether the sensor should sleep: the foot has stood for the time that is set, nobody wants anything, and no raw
+    /// recording runs. While it sleeps that stays so until a command comes.
+    pub fn drowsy(&self) -> bool {
+        let after_us = f64::from(self.parameters.sleep_after_s) * 1e6;
+        let still = self.pipeline.tracker().state() == State::Tracking && !self.link.raw();
+        still && after_us > 0.0 && (self.seen - self.moved) as f64 >= after_us
     }
 
-    /// The board was asleep and the foot moves: what it did meanwhile is not known.
-    pub fn woken(&mut self, now: Micros) {
-        self.moved = now;
-        // The foot is on its way, so no rest will come first.
-        for order in [Order::Init, Order::Track] {
-            if self.pipeline.obey(order) && self.link.raw() {
-                self.record(RawItem::Order(order));
-            }
-        }
+    /// The sensor was put to sleep.
+    pub fn fell_asleep(&mut self) {
+        self.asleep = true;
+        self.sleeps = self.sleeps.saturating_add(1);
+        // It would be old when the next one comes.
+        self.attitude = None;
+    }
+
+    /// The sensor was woken at `time`, by motion or by a command: until then the foot stood.
+    pub fn woke(&mut self, time: Micros) {
+        self.asleep = false;
+        self.moved = self.moved.max(time);
+        self.pipeline.stood_until(time);
+    }
+
+    /// Whether the sensor sleeps.
+    pub fn asleep(&self) -> bool {
+        self.asleep
     }
 
     /// The tracker as it is.
@@ -273,6 +297,7 @@ mod tests {
     use super::*;
     use crate::selftest::{Batches, STRIDES};
     use crate::step::FloorMode;
+    use crate::tracker::Order;
     use crate::wire::frame::AnyDecoder;
     use crate::wire::message::{Ack, Action, Command, LaptopHello, Outcome, ToShoe};
     use crate::wire::outbox::Pace;
@@ -475,28 +500,5 @@ mod tests {
             if first.text == "line 2" && last.text == "line 9" && lines.len() == LOGS_WAITING));
         assert!(said.iter().any(|message| matches!(message, FromShoe::Status(status) if status.stack == 1_234)));
         assert!(shoe.deadline(Micros(40)) > Micros(40), "nothing is left");
-    }
-
-    #[test]
-    fn who_stands_still_may_sleep_and_wakes_in_motion() {
-        let mut shoe = connected();
-        assert_eq!(shoe.still_since(), None, "not before the tracker knows where it is");
-        let batches = batches();
-        // The walk begins with 3 s of rest.
-        for batch in batches.iter().take_while(|batch| batch.stamp < Micros(2_900_000)) {
-            shoe.sensed(batch);
-        }
-        assert!(shoe.still_since().is_some_and(|since| since < Micros(1_500_000)), "{:?}", shoe.still_since());
-        shoe.woken(Micros(2_900_000));
-        let late = batches.iter().filter(|batch| batch.stamp > Micros(4_200_000));
-        let mut said = Vec::new();
-        for batch in late {
-            shoe.sensed(batch);
-            said.extend(listen(&mut shoe, batch.stamp));
-        }
-        let steps: Vec<_> = steps(&said).iter().map(PackedStep::unpack).collect();
-        // Steps go on within two strides, the first of them marked.
-        let woken: Vec<_> = steps.iter().filter(|step| step.stance_end > Micros(4_200_000)).collect();
-        assert!(woken.len() > STRIDES - 5 && woken[0].quality.gap && !woken[2].quality.gap, "{}", woken.len());
     }
 }

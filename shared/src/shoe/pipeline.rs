@@ -3,6 +3,7 @@
 use crate::bmx055::{Batch, Config, Merger};
 use crate::calibration::Calibration;
 use crate::sample::ImuSample;
+use crate::time::Micros;
 use crate::tracker::{Order, Output, Parameters, Tracker};
 
 /// Merger, calibration and tracker. What it tells is a function of what it was given alone.
@@ -46,6 +47,11 @@ impl Pipeline {
     /// Carries an order out; whether it could be.
     pub fn obey(&mut self, order: Order) -> bool {
         self.tracker.obey(order)
+    }
+
+    /// The sensor slept while the foot stood, until `time`.
+    pub fn stood_until(&mut self, time: Micros) {
+        self.tracker.stood_until(time);
     }
 
     /// The tracker as it is.

@@ -124,6 +124,11 @@ impl Ground {
         self.commanded = mode;
     }
 
+    /// Whether the foot stands in an elevator that moves.
+    pub fn rides(&self) -> bool {
+        self.riding
+    }
+
     /// Takes a sight in.
     pub fn observe(&mut self, sight: &Sight) -> Finding {
         let p = self.parameters;

@@ -76,6 +76,9 @@ pub struct Parameters {
     pub method: Method,
     /// When no rest comes, the tracker starts in motion after this time. **Units:** s. Method `pivot`.
     pub start_after_s: f32,
+    /// A sensor that can sleep does so when the foot has stood so long; 0 is never. **Units:** s. The tracker itself makes
+    /// nothing of it.
+    pub sleep_after_s: f32,
     /// How samples are gathered. Method `pivot`.
     pub preintegration: preintegration::Parameters,
     /// When the foot stands. Method `pivot`, and detector `adaptive`.
@@ -97,6 +100,7 @@ impl Default for Parameters {
         Self {
             method: Method::Pivot,
             start_after_s: 3.0,
+            sleep_after_s: 60.0,
             preintegration: Default::default(),
             stance: Default::default(),
             rest: Default::default(),
@@ -118,11 +122,12 @@ impl Parameters {
 pub use documented::Parameters as DocumentParameters;
 
 /// What the tracker is doing (Foot, 4.4.2).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]
 pub enum State {
     /// Nothing seen yet.
+    #[default]
     Reset,
     /// Waiting for the foot to rest.
     Init,
@@ -257,6 +262,19 @@ impl Tracker {
     /// [`Method::Unscented`], whose filter needs a rest.
     pub fn start_moving(&mut self) -> bool {
         self.way.start_moving()
+    }
+
+    /// The sensor slept, because the foot stood still, and woke at `time`, when it moved again: everything is as it was at the
+    /// last sample, and the next one is a little later. A `time` before the last sample changes nothing.
+    pub fn stood_until(&mut self, time: Micros) {
+        let Some(last) = self.last.filter(|&last| last < time) else { return };
+        self.last = Some(time);
+        self.way.stood_until(time, time.since(last));
+    }
+
+    /// Whether the foot stands on something that moves, as in an elevator.
+    pub fn rides(&self) -> bool {
+        self.way.rides()
     }
 
     /// Carries an order out. Whether it could be in the present state; if not, nothing has changed.

@@ -119,6 +119,25 @@ impl Own {
         self.steps.warn().gap = true;
     }
 
+    /// The sensor slept until `time`, and the foot stood.
+    pub(super) fn stood_until(&mut self, time: Micros, slept_s: f32) {
+        self.preintegrator.stood_until(time);
+        self.rest.reset();
+        if self.state == State::Tracking {
+            // The newest increment and the next one are no neighbours.
+            self.ring = [None; 2];
+            self.steps.stood_until(time);
+            self.filter.stand(slept_s);
+        } else {
+            self.waiting_since = self.waiting_since.map(|since| since.max(time));
+        }
+    }
+
+    /// The foot stands on something that moves.
+    pub(super) fn rides(&self) -> bool {
+        self.ground.rides()
+    }
+
     pub(super) fn start_moving(&mut self) -> bool {
         self.impatient = self.state != State::Tracking;
         self.impatient

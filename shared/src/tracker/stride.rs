@@ -96,6 +96,13 @@ impl StepBuilder {
         if long && !stance.reported { Event::Complete } else { Event::None }
     }
 
+    /// The foot stood until `time`, unseen.
+    pub fn stood_until(&mut self, time: Micros) {
+        if let Some(stance) = &mut self.stance {
+            stance.end = stance.end.max(time);
+        }
+    }
+
     fn leave(&mut self) -> Event {
         if let Some(stance) = self.stance.take() {
             self.left_at = Some(stance.end);

@@ -69,6 +69,20 @@ impl Way {
         }
     }
 
+    pub(super) fn stood_until(&mut self, time: Micros, slept_s: f32) {
+        match self {
+            Self::Own(own) => own.stood_until(time, slept_s),
+            Self::Documented(documented) => documented.stood_until(time, slept_s),
+        }
+    }
+
+    pub(super) fn rides(&self) -> bool {
+        match self {
+            Self::Own(own) => own.rides(),
+            Self::Documented(documented) => documented.rides(),
+        }
+    }
+
     pub(super) fn phase(&self) -> State {
         match self {
             Self::Own(own) => own.phase(),

@@ -73,6 +73,8 @@ fn status() -> Status {
         battery: None,
         stack: 9_872,
         reset: ResetReason::Watchdog,
+        asleep: true,
+        sleeps: 12,
         waiting: 3,
         accel: DieCounters {
             frames: 120_000,
@@ -218,6 +220,7 @@ fn the_longest_messages_fit_their_buffers() {
             lateness_us: u32::MAX,
             battery: Some(4.2),
             stack: u32::MAX,
+            sleeps: u16::MAX,
             waiting: u16::MAX,
             accel: counters(u32::MAX),
             gyro: counters(u32::MAX),

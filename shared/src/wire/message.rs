@@ -193,7 +193,7 @@ pub enum ResetReason {
 }
 
 /// How the shoe is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Status {
     /// When this was so.
     pub time: Micros,
@@ -212,6 +212,10 @@ pub struct Status {
     pub stack: u32,
     /// Why the processor started.
     pub reset: ResetReason,
+    /// The sensor sleeps until the foot moves or a command comes; a status is rare then.
+    pub asleep: bool,
+    /// Times the sensor was put to sleep since the boot.
+    pub sleeps: u16,
     /// Steps that wait for their acknowledgement.
     pub waiting: u16,
     /// Accelerometer.

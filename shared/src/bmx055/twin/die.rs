@@ -15,6 +15,14 @@ const WRITE_IDLE_NS: [u64; 2] = [2_000, 450_000];
 /// Bits of the power register that stop a die: suspend and deep suspend.
 const SUSPENDED: u8 = 0xA0;
 
+/// Sleep of the accelerometer by its code in bits 4 to 1 of the power register; all below the sixth are 0.5 ms (BMA255).
+/// **Units:** us.
+const SLEEPS_US: [u64; 16] =
+    [500, 500, 500, 500, 500, 500, 1_000, 2_000, 4_000, 6_000, 10_000, 25_000, 50_000, 100_000, 500_000, 1_000_000];
+
+/// Counts of a unit of the slope threshold.
+const SLOPE_UNIT: u32 = 4;
+
 /// How long the gyroscope tests itself (Bosch's driver waits as long). **Units:** ns.
 const GYRO_TEST_NS: u64 = 10_000_000;
 
@@ -46,6 +54,8 @@ pub struct Faults {
 pub struct Observed {
     /// Readings taken.
     pub taken: u64,
+    /// Bytes on its bus.
+    pub bytes: u64,
     /// Frames that were read whole.
     pub read: u64,
     /// Writes that came too soon after the last, or during a reset, and had no effect.
@@ -71,6 +81,12 @@ pub(super) struct DieTwin {
     written_ns: Option<u64>,
     /// End of the self-test of the gyroscope.
     tested_ns: u64,
+    /// Counts of the last reading, of which the slope is taken.
+    before: Option<[i16; 3]>,
+    /// Slopes above the threshold, one after the other.
+    steep: u8,
+    /// The interrupt of motion.
+    motion: bool,
     line: bool,
     edge_ns: Option<u64>,
     /// Start of the transaction.
@@ -95,6 +111,9 @@ impl DieTwin {
             boot_ns: 0,
             written_ns: None,
             tested_ns: u64::MAX,
+            before: None,
+            steep: 0,
+            motion: false,
             line: false,
             edge_ns: None,
             selected_ns: 0,
@@ -129,6 +148,7 @@ impl DieTwin {
         self.next_ns = self.boot_ns + self.sample_ns();
         self.written_ns = None;
         self.tested_ns = u64::MAX;
+        (self.before, self.steep, self.motion) = (None, 0, false);
         self.update_line(now_ns);
     }
 
@@ -149,11 +169,42 @@ impl DieTwin {
             Die::Accel => period_of_accel(self.get(both::BANDWIDTH)),
             Die::Gyro => period_of_gyro(self.get(both::BANDWIDTH)),
         };
-        self.period_ns * u64::from(nominal_us) / 500
+        let sleep_us = if self.dozes() { SLEEPS_US[usize::from(self.get(both::POWER) >> 1 & 0x0F)] } else { 0 };
+        self.period_ns * (u64::from(nominal_us) + sleep_us) / 500
     }
 
     fn suspended(&self) -> bool {
         self.get(both::POWER) & SUSPENDED != 0
+    }
+
+    /// Sleeps between readings.
+    fn dozes(&self) -> bool {
+        self.die == Die::Accel && !self.suspended() && self.get(both::POWER) & accel::POWER_LOW != 0
+    }
+
+    /// The interrupt of motion is led to a pin that can be seen.
+    fn tells_of_motion(&self) -> bool {
+        self.die == Die::Accel
+            && self.get(accel::INT_EN_0) & accel::INT_EN_0_SLOPE != 0
+            && self.get(accel::INT_MAP_0) & accel::INT_MAP_0_SLOPE != 0
+            && self.get(accel::INT_OUT) & 0x03 == accel::INT_OUT_INT1_HIGH
+    }
+
+    /// Takes the slope to a new reading.
+    fn measure_slope(&mut self, counts: [i16; 3]) {
+        let enabled = self.get(accel::INT_EN_0) & accel::INT_EN_0_SLOPE;
+        if enabled == 0 {
+            (self.before, self.steep) = (None, 0);
+            return;
+        }
+        let Some(before) = self.before.replace(counts) else { return };
+        let threshold = u32::from(self.get(accel::SLOPE_THRESHOLD)) * SLOPE_UNIT;
+        let mut axes = counts.into_iter().zip(before).enumerate();
+        let steep =
+            axes.any(|(axis, (now, before))| enabled >> axis & 1 != 0 && u32::from(now.abs_diff(before)) > threshold);
+        self.steep = if steep { self.steep.saturating_add(1) } else { 0 };
+        let latched = self.get(accel::INT_LATCH) & 0x0F == accel::INT_LATCH_FOREVER;
+        self.motion = self.steep > self.get(accel::SLOPE_DURATION) & 0x03 || latched && self.motion;
     }
 
     fn depth(&self) -> usize {
@@ -189,7 +240,8 @@ impl DieTwin {
     }
 
     fn update_line(&mut self, now_ns: u64) {
-        let line = self.watermark().is_some_and(|watermark| self.fifo.len() >= watermark);
+        let line = self.watermark().is_some_and(|watermark| self.fifo.len() >= watermark)
+            || self.motion && self.tells_of_motion();
         if line && !self.line {
             if self.faults.interrupts > 0 {
                 self.faults.interrupts -= 1;
@@ -198,6 +250,9 @@ impl DieTwin {
             }
         }
         self.line = line;
+        if self.watermark().is_none() && !self.tells_of_motion() {
+            self.edge_ns = None;
+        }
     }
 
     /// The last rising edge of the line that was not taken yet. **Units:** ns.
@@ -205,11 +260,16 @@ impl DieTwin {
         self.edge_ns.take()
     }
 
-    /// When the line rises next if nobody reads. **Units:** ns.
+    /// When the line rises next if nobody reads, or, where motion raises it, when it may. **Units:** ns.
     pub fn next_edge(&self) -> Option<u64> {
+        if self.suspended() || self.faults.stuck || self.faults.interrupts > 0 {
+            return None;
+        }
+        if self.tells_of_motion() {
+            return (!self.line).then_some(self.next_ns);
+        }
         let missing = self.watermark()?.checked_sub(self.fifo.len())?.checked_sub(1)?;
-        let runs = !self.suspended() && !self.faults.stuck && self.faults.interrupts == 0;
-        runs.then(|| self.next_ns + missing as u64 * self.sample_ns())
+        Some(self.next_ns + missing as u64 * self.sample_ns())
     }
 
     /// Takes the readings that are due.
@@ -220,12 +280,30 @@ impl DieTwin {
             if self.suspended() || self.faults.stuck {
                 continue;
             }
-            let frame = self.frame(counts(time_ns));
+            let counts = if self.dozes() { self.filtered(time_ns, &mut counts) } else { counts(time_ns) };
+            let frame = self.frame(counts);
             self.observed.taken += 1;
+            if self.die == Die::Accel {
+                self.measure_slope(counts);
+            }
             self.latest = frame;
             self.fifo.push(frame, self.get(both::FIFO_CONFIG_1), self.depth());
             self.update_line(time_ns);
         }
+    }
+
+    /// A reading that took its time: the mean of four, spread over the time that the low-pass filter needs.
+    fn filtered(&self, time_ns: u64, mut counts: impl FnMut(u64) -> [i16; 3]) -> [i16; 3] {
+        let apart_ns = self.period_ns * u64::from(period_of_accel(self.get(both::BANDWIDTH))) / 500 / 4;
+        let mut sums = [0_i32; 3];
+        for before in (0..4).rev() {
+            let reading = counts(time_ns.saturating_sub(before * apart_ns));
+            for (sum, count) in sums.iter_mut().zip(reading) {
+                *sum += i32::from(count);
+            }
+        }
+        // A mean of four numbers of 16 bits.
+        sums.map(|sum| (sum / 4) as i16)
     }
 
     /// The bytes of a reading.
@@ -269,6 +347,7 @@ impl DieTwin {
 
     /// A byte goes either way; the first is the address.
     pub fn exchange(&mut self, sent: u8, now_ns: u64) -> u8 {
+        self.observed.bytes += 1;
         let Some((register, read)) = self.address.next(sent) else { return 0 };
         if read {
             return self.read(register, now_ns);
@@ -347,12 +426,18 @@ impl DieTwin {
             gyro::SELF_TEST if self.die == Die::Gyro && value & gyro::SELF_TEST_START != 0 => {
                 self.tested_ns = now_ns + GYRO_TEST_NS;
             }
+            accel::INT_LATCH if self.die == Die::Accel && value & accel::INT_LATCH_END != 0 => self.motion = false,
             _ => {}
         }
-        let period_ns = self.sample_ns();
-        self.set(register, value);
+        let (period_ns, suspended) = (self.sample_ns(), self.suspended());
+        let ends = if register == accel::INT_LATCH && self.die == Die::Accel { accel::INT_LATCH_END } else { 0 };
+        self.set(register, value & !ends);
         if self.sample_ns() != period_ns {
             self.next_ns = now_ns + self.sample_ns();
+        }
+        if suspended && !self.suspended() {
+            let start_us = if self.die == Die::Gyro { gyro::BOOT_US } else { accel::BOOT_US };
+            self.next_ns = now_ns + u64::from(start_us) * 1_000 + self.sample_ns();
         }
         self.update_line(now_ns);
     }

@@ -116,6 +116,17 @@ impl Documented {
         false
     }
 
+    /// The sensor slept until `time`, and the foot stood.
+    pub(in crate::tracker) fn stood_until(&mut self, time: Micros, _: f32) {
+        self.last = self.last.map(|last| last.max(time));
+        self.steps.stood_until(time);
+    }
+
+    /// The foot stands on something that moves.
+    pub(in crate::tracker) fn rides(&self) -> bool {
+        self.ground.rides()
+    }
+
     pub(in crate::tracker) fn phase(&self) -> State {
         self.phase
     }
