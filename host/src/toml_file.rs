@@ -1,6 +1,7 @@
 //! Files in TOML that people write and edit: read whole, or refused with the line that is wrong.
 
 use serde::de::DeserializeOwned;
+use sohle_shared::tracker::settings::Unfit;
 use std::path::{Path, PathBuf};
 
 /// Why a file is refused.
@@ -27,6 +28,16 @@ pub enum TomlFileError {
         line: usize,
         /// What is wrong and what was expected.
         message: String,
+    },
+    /// Settings that make no sense.
+    #[error("{what} {}: {source}", path.display())]
+    Unfit {
+        /// What the file is to hold.
+        what: &'static str,
+        /// Which file.
+        path: PathBuf,
+        /// Which setting, and its bounds.
+        source: Unfit,
     },
 }
 

@@ -92,6 +92,9 @@ fn main() -> ! {
         defmt::error!("before the reset: {=str}", words.as_str());
         shoe.log(now(), Level::Error, &words);
     }
+    if settings.refused() {
+        shoe.log(now(), Level::Warn, "kept settings cannot be used: defaults are in effect");
+    }
     let line = board.rx.into_ring_buffered(BUFFER.init([0; RING]));
     let mut machine = Machine { settings, watchdog: board.watchdog, load: Load::start(), reset: board.reset };
     machine.watchdog.unleash();

@@ -32,16 +32,29 @@ pub trait Stored: Serialize + DeserializeOwned {
     const KEY: u8;
     /// Number of its layout.
     const LAYOUT: u16;
+
+    /// Whether its values may be used; others are refused like bytes that are no such value.
+    fn is_fit(&self) -> bool {
+        true
+    }
 }
 
 impl Stored for Calibration {
     const KEY: u8 = 1;
     const LAYOUT: u16 = 1;
+
+    fn is_fit(&self) -> bool {
+        self.is_finite()
+    }
 }
 
 impl Stored for Parameters {
     const KEY: u8 = 2;
     const LAYOUT: u16 = 1;
+
+    fn is_fit(&self) -> bool {
+        self.check().is_ok()
+    }
 }
 
 /// Why something was not loaded or saved.
@@ -61,7 +74,7 @@ pub enum Error<E> {
         /// The one expected.
         expected: u16,
     },
-    /// The bytes are intact but no such value.
+    /// The bytes are intact but no such value, or its numbers make no sense.
     Value,
     /// What was written reads differently; the next attempt takes another page.
     Verify,
@@ -76,7 +89,7 @@ impl<E: core::fmt::Debug> core::fmt::Display for Error<E> {
             Self::Layout { stored, expected } => {
                 write!(out, "the stored value has layout {stored}, expected {expected}: store it anew")
             }
-            Self::Value => out.write_str("the stored bytes are intact but no such value"),
+            Self::Value => out.write_str("the stored bytes are intact but no value of use"),
             Self::Verify => out.write_str("the flash reads something else than was written"),
         }
     }
@@ -223,7 +236,8 @@ impl<F: NorFlash> Store<F> {
         if layout != T::LAYOUT {
             return Err(Error::Layout { stored: layout, expected: T::LAYOUT });
         }
-        postcard::from_bytes(&record.bytes[start + ENTRY..end]).map(Some).map_err(|_| Error::Value)
+        let value = postcard::from_bytes(&record.bytes[start + ENTRY..end]).map_err(|_| Error::Value)?;
+        if T::is_fit(&value) { Ok(Some(value)) } else { Err(Error::Value) }
     }
 
     /// Keeps `value` in place of the one before; the others stay. If the power fails meanwhile, one of both is found
@@ -494,6 +508,14 @@ mod tests {
         assert_eq!(run(store.load::<Calibration>()), Err(Error::Layout { stored: 2, expected: 1 }));
         run(store.save(&Short(3))).unwrap();
         assert_eq!(run(store.load::<Calibration>()), Err(Error::Value));
+        let unfit = Calibration { mounting: Some([f32::NAN; 4]), ..Calibration::default() };
+        run(store.save(&unfit)).unwrap();
+        assert_eq!(run(store.load::<Calibration>()), Err(Error::Value));
+        let mut unfit = Parameters::default();
+        (unfit.stance.floor, unfit.stance.ceiling) = (10.0, 1.0);
+        run(store.save(&unfit)).unwrap();
+        assert_eq!(run(store.load::<Parameters>()), Err(Error::Value));
+        run(store.forget::<Parameters>()).unwrap();
         run(store.save(&calibration(5))).unwrap();
         assert_eq!(kept(&mut store), (Some(5), None));
     }

@@ -24,6 +24,14 @@ pub struct Change {
     pub covariance: Matrix4<f32>,
 }
 
+impl Change {
+    /// Whether every value is a number.
+    pub fn is_finite(&self) -> bool {
+        let numbers = self.displacement.iter().chain(&self.covariance).chain([&self.turn]);
+        numbers.into_iter().all(|value| value.is_finite())
+    }
+}
+
 /// The change from the attitude `reference`, at the origin, to `state`. `covariance` is that of the state; a filter may have
 /// more states behind these nine, which stay as they are.
 pub fn change<const N: usize>(

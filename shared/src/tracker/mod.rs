@@ -10,6 +10,7 @@
 mod documented;
 pub mod ground;
 mod own;
+pub mod settings;
 pub mod stride;
 #[cfg(feature = "documented")]
 mod way;
@@ -67,7 +68,7 @@ pub enum Detector {
     Adaptive,
 }
 
-/// All settings of a tracker. Those of the method that is not chosen have no effect.
+/// All settings of a tracker. Those of the method that is not chosen have no effect. [`settings`] has the bounds of each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "wire", derive(postcard_schema::Schema))]

@@ -237,14 +237,15 @@ impl Own {
         let swings = speed.certain > self.swing_speed
             || (speed.likely > self.swing_speed && statistic > SWING_STATISTIC && statistic.is_finite());
         let event = self.steps.observe(increment.end, since, statistic, swings);
-        let step = if event == Event::Complete && !finding.riding {
-            let mode = if since.is_some() { finding.mode } else { stood_on };
-            self.complete(mode, counters)
-        } else {
-            None
-        };
+        let complete = event == Event::Complete && !finding.riding;
+        let mode = if since.is_some() { finding.mode } else { stood_on };
+        let step = if complete { self.complete(mode, counters) } else { None };
 
-        if !self.filter.is_finite() || self.filter.state().velocity.norm_squared() > LOST_SPEED * LOST_SPEED {
+        let numbers = self.filter.is_finite() && step.is_some() == complete;
+        if !numbers {
+            self.filter.start(&Vector3::new(0.0, 0.0, STANDARD_GRAVITY_M_S2), None);
+        }
+        if !numbers || self.filter.state().velocity.norm_squared() > LOST_SPEED * LOST_SPEED {
             counters.restarts += 1;
             self.initialise(Some(increment.end));
         }
@@ -273,7 +274,7 @@ impl Own {
         }
     }
 
-    /// The step of a stance on ground of this kind.
+    /// The step of a stance on ground of this kind; none when the filter no longer has numbers for it.
     fn complete(&mut self, mode: FloorMode, counters: &mut Counters) -> Option<Step> {
         let change = self.filter.rebase();
         self.ground.rebased();
@@ -282,7 +283,7 @@ impl Own {
             self.repaired = self.filter.repaired();
             self.steps.warn().repaired = true;
         }
-        self.steps.take(change, mode, self.stance)
+        if change.is_finite() { self.steps.take(change, mode, self.stance) } else { None }
     }
 
     pub(super) fn finish(&mut self, counters: &mut Counters) -> Option<Step> {

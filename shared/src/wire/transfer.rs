@@ -59,7 +59,11 @@ impl Value {
 
     fn decode(item: Item, bytes: &[u8]) -> Result<Self, Refusal> {
         Ok(match item {
-            Item::Parameters => Self::Parameters(decode(bytes)?),
+            Item::Parameters => {
+                let parameters: Parameters = decode(bytes)?;
+                parameters.check().map_err(|_| Refusal::Value)?;
+                Self::Parameters(parameters)
+            }
             Item::Calibration => {
                 let calibration: Calibration = decode(bytes)?;
                 if !calibration.is_finite() {
@@ -230,6 +234,18 @@ mod tests {
         assert_eq!(push(Item::Parameters, value), Err(Refusal::Value));
         value.accel.bias[1] = f32::NAN;
         assert_eq!(push(Item::Calibration, value), Err(Refusal::Value));
+    }
+
+    #[test]
+    fn parameters_must_make_sense() {
+        for floor in [1e6, -1.0, f32::NAN] {
+            let mut parameters = Parameters::default();
+            parameters.stance.floor = floor;
+            let mut assembly = Assembly::new();
+            let pieces = pieces(&Value::Parameters(parameters));
+            let results: std::vec::Vec<_> = pieces.iter().map(|piece| assembly.push(Item::Parameters, piece)).collect();
+            assert_eq!(results.last(), Some(&Err(Refusal::Value)), "{floor}");
+        }
     }
 
     #[test]
