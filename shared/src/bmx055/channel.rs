@@ -55,6 +55,10 @@ const INVALID: i16 = i16::MIN;
 /// fallen, and the die is asked again.
 const MARGIN: usize = 4;
 
+/// So often the FIFO is asked for one interrupt. Each time it is emptied but for some frames, and it does not fill as fast as
+/// it is read: one that still has a watermark then does not count its frames.
+const ROUNDS_MAX: usize = 8;
+
 /// A die and what is known of it.
 #[derive(Debug)]
 pub(super) struct Channel<SPI> {
@@ -369,8 +373,9 @@ impl<SPI: SpiDevice> Channel<SPI> {
         temperature: Option<i8>,
         sink: &mut impl FnMut(&Batch),
     ) -> Result<(), Error> {
+        let now = stamp;
         let mut stamp = stamp;
-        loop {
+        for _ in 0..ROUNDS_MAX {
             let (mut frames, overrun) = self.stored().await?;
             if overrun {
                 // Nobody knows which frame belongs to the stamp.
@@ -391,6 +396,8 @@ impl<SPI: SpiDevice> Channel<SPI> {
                 return Ok(());
             }
         }
+        self.restart(now);
+        Ok(())
     }
 
     /// Frames in the FIFO, and whether it has run over.

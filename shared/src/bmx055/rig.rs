@@ -213,6 +213,20 @@ mod tests {
     }
 
     #[test]
+    fn a_fifo_that_never_empties_does_not_hold_the_driver_up() {
+        let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, numbered()));
+        let mut rig = Rig::new(&twin, &Config::default());
+        rig.run(500_000);
+        twin.borrow_mut().faults(Die::Accel).register = Some((both::FIFO_STATUS, 0x7F));
+        rig.run(200_000);
+        assert!(rig.driver.counters(Die::Accel).restarts > 0);
+        twin.borrow_mut().faults(Die::Accel).register = None;
+        rig.run(200_000);
+        assert_eq!(rig.states(), [State::Run; 2]);
+        assert_eq!(rig.driver.counters(Die::Gyro).restarts, 0);
+    }
+
+    #[test]
     fn a_die_that_forgot_its_registers_is_set_up_anew() {
         for die in [Die::Accel, Die::Gyro] {
             let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, numbered()));
