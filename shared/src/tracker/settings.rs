@@ -123,6 +123,7 @@ macro_rules! settings {
 /// Every number among the settings, in the order of [`Parameters`].
 pub const SETTINGS: &[Setting] = settings! {
     start_after_s: "s", 0.0, 1e5;
+    sleep_after_s: "s", 0.0, 1e6;
 
     preintegration.period_s: "s", 0.001, 0.1;
     preintegration.gap_s: "s", 0.01, 10.0;
