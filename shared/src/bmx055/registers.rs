@@ -84,7 +84,7 @@ pub mod accel {
     /// Bits 1 and 0: one more slope than this must lie above the threshold, one after the other.
     pub const SLOPE_DURATION: u8 = 0x27;
     /// Difference between one reading and the next on an axis that is motion when exceeded. **Units:** 4 counts: 3.91 mg
-    /// at ±2 g, 31.25 mg at ±16 g.
+    /// at ±2 g, 31.25 mg at ±16 g; not confirmed for this package.
     pub const SLOPE_THRESHOLD: u8 = 0x28;
     /// Watermark of the FIFO.
     pub const FIFO_WATERMARK: u8 = 0x30;
