@@ -156,14 +156,18 @@ impl<SPI> Channel<SPI> {
         &mut self.spi
     }
 
-    /// Sets the die up anew as soon as possible.
+    /// Sets the die up anew as soon as possible, because something went wrong.
     pub fn restart(&mut self, now: Micros) {
+        self.set_up(now);
+        self.counters.restarts = self.counters.restarts.saturating_add(1);
+    }
+
+    fn set_up(&mut self, now: Micros) {
         self.state = State::Reset;
         self.due = now;
         self.failures = 0;
         self.retry = false;
         self.lost = true;
-        self.counters.restarts = self.counters.restarts.saturating_add(1);
     }
 
     /// It was told to sleep, and is looked at next at `due`.
@@ -173,9 +177,7 @@ impl<SPI> Channel<SPI> {
 
     /// Ends the sleep: the die is set up anew. Its frames go on after a gap.
     pub fn wake(&mut self, now: Micros) {
-        let restarts = self.counters.restarts;
-        self.restart(now);
-        self.counters.restarts = restarts;
+        self.set_up(now);
     }
 
     /// Counts what went wrong.
