@@ -249,9 +249,9 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     /// Whether the sensor should sleep: the foot has stood for the time that is set, nobody wants anything, and no raw
     /// recording runs. While it sleeps that stays so until a command comes.
     pub fn drowsy(&self) -> bool {
-        let after_us = f64::from(self.parameters.sleep_after_s) * 1e6;
+        let after_us = (self.parameters.sleep_after_s * 1e6) as i64;
         let still = self.pipeline.tracker().state() == State::Tracking && !self.link.raw();
-        still && after_us > 0.0 && (self.seen - self.moved) as f64 >= after_us
+        still && after_us > 0 && self.seen - self.moved >= after_us
     }
 
     /// The sensor was put to sleep.
