@@ -50,7 +50,7 @@ impl Stored for Calibration {
 
 impl Stored for Parameters {
     const KEY: u8 = 2;
-    const LAYOUT: u16 = 2;
+    const LAYOUT: u16 = 3;
 
     fn is_fit(&self) -> bool {
         self.check().is_ok()

@@ -167,7 +167,9 @@ pub const SETTINGS: &[Setting] = settings! {
     filter.gap_accel_sigma: "m/s²", 0.0, 1e3;
     filter.heading_share: "1", 0.0, 1.0;
     filter.vertical_bias_share: "1", 0.0, 1.0;
+    filter.force_bias_share: "1", 0.0, 1.0;
     filter.gravity_sigma: "m/s²", 1e-4, 10.0;
+    filter.force_sigma: "m/s²", 1e-4, 10.0;
     filter.height_sigma: "m", 1e-5, 1.0;
 
     ground.level_m: "m", 0.0, 10.0;
