@@ -446,7 +446,7 @@ impl PivotFilter {
         correction: &mut Direction,
         considered: Considered,
     ) {
-        let shared = self.covariance * reading;
+        let shared = self.covariance_with(reading);
         let total = reading.dot(&shared) + variance;
         if !(total > 0.0 && total.is_finite() && innovation.is_finite()) {
             self.repair();
@@ -478,6 +478,17 @@ impl PivotFilter {
         if (0..FREEDOMS).any(|i| self.covariance[(i, i)].is_nan() || self.covariance[(i, i)] < 0.0) {
             self.repair();
         }
+    }
+
+    /// `P h`. A measurement sees but a few components of the error: the rest of the covariance would be added as nothing.
+    fn covariance_with(&self, reading: &Direction) -> Direction {
+        let mut shared = Direction::zeros();
+        for (column, part) in self.covariance.column_iter().zip(reading.iter()) {
+            if *part != 0.0 {
+                shared += column * *part;
+            }
+        }
+        shared
     }
 
     fn apply(&mut self, correction: &Direction) {
