@@ -6,6 +6,7 @@ pub mod evaluation;
 pub mod export;
 pub mod gravity;
 pub mod link;
+pub mod particle;
 pub mod recording;
 pub mod simulation;
 pub mod toml_file;

@@ -1,0 +1,433 @@
+//! The particle filter: from steps to a place in the building.
+
+use super::Error;
+use super::cloud::Particle;
+use super::cluster::{self, Cluster, Clusters};
+use super::estimate::{Estimate, RoomShare, State};
+use super::map::{ConnectorKind, Map};
+use super::motion::{self, Moved};
+use super::parameters::{Method, Parameters};
+use super::random::{Purpose, Stream};
+use super::resampling;
+use super::start::{self, Patch, Seeded, Start};
+use sohle_shared::step::Step;
+use sohle_shared::time::Micros;
+use std::sync::Arc;
+
+/// A bin of the adaptive number of particles. **Units:** m.
+const BIN_M: f32 = 0.5;
+/// Headings of a bin.
+const BIN_HEADINGS: usize = 16;
+/// Shares of the weight below this are not told.
+const LEAST_SHARE: f64 = 1e-3;
+/// Most places and rooms that are told.
+const MOST_TOLD: usize = 50;
+/// What a step would be worth to a cloud that lies anywhere: about half of all moves meet no wall.
+const ANYWHERE_LIKELIHOOD: f64 = 0.5;
+/// How fast somebody may have gone whose steps are missing. **Units:** m/s.
+const FASTEST_M_S: f32 = 1.8;
+/// How far a missing step may have led. **Units:** m.
+const LONGEST_STEP_M: f32 = 2.0;
+/// Somebody who is lost is looked for this far around at first. **Units:** m.
+const LOST_RADIUS_M: f32 = 15.0;
+/// Part of the weight that stays with what was believed when it counts as lost, and part that goes to the surroundings; the
+/// rest goes to everywhere.
+const BELIEVED_PART: f32 = 0.2;
+const AROUND_PART: f32 = 0.4;
+
+/// Follows a person in a building.
+#[derive(Clone, Debug)]
+pub struct ParticleFilter {
+    map: Arc<Map>,
+    parameters: Parameters,
+    seed: u64,
+    particles: Vec<Particle>,
+    /// The other half of drawing.
+    drawn: Vec<Particle>,
+    clusters: Clusters,
+    bins: Bins,
+    /// Counts the steps of this filter.
+    number: u64,
+    previous: Option<(u32, Micros)>,
+    spread: Spread,
+    /// Logarithm of the odds against the cloud, never below 0.
+    against: f64,
+    /// Steps in a row for which the place was clear.
+    clear_steps: u32,
+    estimate: Estimate,
+}
+
+/// The space that each particle of a sown cloud stands for; it shrinks as the cloud does.
+#[derive(Clone, Copy, Debug)]
+struct Spread {
+    half_spacing_m: f32,
+    half_sector: f32,
+    /// Share of the sown space that is left.
+    volume: f64,
+    /// Particles that were sown.
+    sown: usize,
+}
+
+impl Spread {
+    fn of(seeded: &Seeded) -> Self {
+        Self {
+            half_spacing_m: seeded.half_spacing_m,
+            half_sector: seeded.half_sector,
+            volume: 1.0,
+            sown: seeded.particles.len(),
+        }
+    }
+
+    /// Side of the space of one of `count` particles, against that at the start.
+    fn side(&self, count: usize) -> f32 {
+        (self.volume * self.sown as f64 / count.max(1) as f64).cbrt().min(1.0) as f32
+    }
+}
+
+impl ParticleFilter {
+    /// Sows the particles.
+    ///
+    /// # Errors
+    /// Settings out of bounds; a start that is not in the building.
+    pub fn new(map: Arc<Map>, parameters: &Parameters, start: &Start, seed: u64) -> Result<Self, Error> {
+        parameters.check()?;
+        let seeded = start::sow(&map, start, parameters, seed)?;
+        let mut filter = Self {
+            parameters: parameters.clone(),
+            seed,
+            drawn: Vec::new(),
+            clusters: Clusters::default(),
+            bins: Bins::new(&map),
+            map,
+            number: 0,
+            previous: None,
+            spread: Spread::of(&seeded),
+            particles: seeded.particles,
+            against: 0.0,
+            clear_steps: 0,
+            estimate: Estimate::default(),
+        };
+        let all = filter.particles.len() as f64;
+        filter.tell(None, 0, all, all, 1.0);
+        Ok(filter)
+    }
+
+    /// Takes in a step; returns what is known after it.
+    pub fn step(&mut self, step: &Step) -> &Estimate {
+        self.number += 1;
+        let documented = self.parameters.method == Method::Documented;
+        if !documented {
+            self.bridge(step);
+        }
+        self.previous = Some((step.index, step.stance_end));
+        let moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
+        let likelihood = moved.likelihood();
+        if documented {
+            self.draw_documented(&moved);
+        } else {
+            self.judge(likelihood);
+            self.draw(&moved);
+        }
+        let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
+        self.tell(Some(step.stance_end), step.index, total, moved.effective(), likelihood);
+        &self.estimate
+    }
+
+    /// Steps that did not come: the person is somewhere around. The first step of all has none before it.
+    fn bridge(&mut self, step: &Step) {
+        let Some((index, end)) = self.previous else { return };
+        let missing = step.index.saturating_sub(index.saturating_add(1));
+        let restarted = step.index <= index;
+        let seconds = (step.stance_start - end).max(0) as f32 * 1e-6;
+        let radius = if missing > 0 {
+            LONGEST_STEP_M * missing as f32
+        } else if restarted || step.quality.gap {
+            FASTEST_M_S * seconds
+        } else {
+            return;
+        };
+        // What a few metres hide, the noise of a few steps finds again; but the heading is gone as well.
+        self.sow_around(radius.max(2.0 * LONGEST_STEP_M), 0.0);
+        self.against = 0.0;
+    }
+
+    /// Whether the steps still fit the building from where the cloud is.
+    fn judge(&mut self, likelihood: f64) {
+        let odds = (ANYWHERE_LIKELIHOOD / likelihood.max(f64::MIN_POSITIVE)).ln();
+        self.against = (self.against + odds).max(0.0);
+        // Whoever searches everywhere cannot be lost.
+        let searching = self.estimate.state == State::Searching;
+        if self.against > f64::from(self.parameters.lost_odds) && !searching {
+            self.against = 0.0;
+            self.clear_steps = 0;
+            self.estimate.state = State::Lost;
+            self.sow_around(LOST_RADIUS_M, BELIEVED_PART);
+        }
+    }
+
+    /// Sows new particles around the likeliest places and, thinly, everywhere; the old ones keep the part `believed`.
+    fn sow_around(&mut self, radius: f32, believed: f32) {
+        let mut stream = Stream::new(self.seed, Purpose::Recover, self.number, 0);
+        let total: f64 = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
+        let mut parameters = self.parameters.clone();
+        parameters.most /= 2;
+        let mut around = Vec::new();
+        let leaders: Vec<Cluster> = self.estimate.clusters.iter().take(3).cloned().collect();
+        for leader in leaders.iter().filter(|leader| leader.probability > 0.1) {
+            let patch = Patch {
+                floor: leader.floor_index,
+                centre: [leader.position.x as f32, leader.position.y as f32],
+                radius: radius + 2.0 * leader.sigma_m() as f32,
+            };
+            around.extend(start::everywhere(&self.map, &parameters, Some(patch), &mut stream).particles);
+        }
+        let everywhere = start::everywhere(&self.map, &parameters, None, &mut stream);
+        let mut spread = Spread::of(&everywhere);
+        if total > 0.0 && believed > 0.0 {
+            weigh(&mut self.particles, believed);
+        } else {
+            self.particles.clear();
+        }
+        let mut sown = everywhere.particles;
+        weigh(&mut sown, 1.0 - AROUND_PART - believed);
+        weigh(&mut around, AROUND_PART);
+        self.particles.append(&mut around);
+        self.particles.append(&mut sown);
+        // Weights near 1 on average, as after drawing.
+        let count = self.particles.len() as f32;
+        self.particles.iter_mut().for_each(|particle| particle.weight *= count);
+        spread.sown = self.particles.len();
+        self.spread = spread;
+    }
+
+    /// Draws as the document does: after each step, as many as are left, but not fewer than N0 (5.24).
+    fn draw_documented(&mut self, moved: &Moved) {
+        let count = moved.alive.max(self.parameters.least);
+        let mut stream = Stream::new(self.seed, Purpose::Draw, self.number, 0);
+        if resampling::draw(&self.particles, count, &mut stream, &mut self.drawn, |_| {}) > 0 {
+            std::mem::swap(&mut self.particles, &mut self.drawn);
+        }
+    }
+
+    /// Draws when too few particles carry the weight, or when fewer would do.
+    fn draw(&mut self, moved: &Moved) {
+        if !(moved.after > 0.0 && moved.after.is_finite()) {
+            // Nothing but what cannot be: all alike.
+            self.particles.iter_mut().for_each(|particle| particle.weight = 1.0);
+            return;
+        }
+        let p = &self.parameters;
+        let mean = moved.after / self.particles.len() as f64;
+        let bins = self.bins.occupied(&self.particles, (mean * 1e-3) as f32);
+        let count = resampling::needed(bins, p.kld_error).clamp(p.least, p.most);
+        // More than there are come only from a cloud that has spread; a little less is not worth the drawing.
+        let few = moved.effective() < f64::from(p.resample_below) * self.particles.len() as f64;
+        let fewer = (count as f64) < 0.7 * self.particles.len() as f64;
+        let more = count as f64 > 1.5 * self.particles.len() as f64;
+        if !(few || fewer || more) {
+            let factor = (1.0 / mean) as f32;
+            self.particles.iter_mut().for_each(|particle| particle.weight *= factor);
+            return;
+        }
+        let before = self.particles.len();
+        let mut stream = Stream::new(self.seed, Purpose::Draw, self.number, 0);
+        let mut parents = Vec::with_capacity(count);
+        let different =
+            resampling::draw(&self.particles, count, &mut stream, &mut self.drawn, |parent| parents.push(parent));
+        std::mem::swap(&mut self.particles, &mut self.drawn);
+        // Where nearly all survive, what is drawn away is not space but only number.
+        let survived = (moved.effective() / before as f64).min(1.0);
+        self.spread.volume *= survived.max(different as f64 / before as f64);
+        self.roughen(&parents);
+    }
+
+    /// Sets copies of one particle apart within the space that it stood for.
+    fn roughen(&mut self, parents: &[usize]) {
+        let share = self.parameters.roughening * self.spread.side(self.particles.len());
+        let (place, sector) = (share * self.spread.half_spacing_m, share * self.spread.half_sector);
+        if !(place > 1e-3 || sector > 1e-3) {
+            return;
+        }
+        let mut stream = Stream::new(self.seed, Purpose::Roughen, self.number, 0);
+        for i in 1..self.particles.len() {
+            if parents[i] != parents[i - 1] {
+                continue;
+            }
+            let particle = &mut self.particles[i];
+            let from = [particle.x, particle.y];
+            let to = [particle.x + place * stream.symmetric(), particle.y + place * stream.symmetric()];
+            particle.heading += sector * stream.symmetric();
+            // Nothing changes its room or its connector by this.
+            let floor = usize::from(particle.floor);
+            let connector = self.map.connector(floor, to).unwrap_or(Particle::ON_FLOOR);
+            if !self.map.blocked(floor, from, to) && connector == particle.connector {
+                [particle.x, particle.y] = to;
+            }
+        }
+    }
+
+    /// Makes the estimate.
+    fn tell(&mut self, time: Option<Micros>, step: u32, total: f64, effective: f64, likelihood: f64) {
+        let p = &self.parameters;
+        let mut clusters = if !(total > 0.0) {
+            Vec::new()
+        } else if p.method == Method::Documented && self.particles.len() <= p.cluster_most {
+            let mut stream = Stream::new(self.seed, Purpose::Cluster, self.number, 0);
+            cluster::documented(&self.particles, total, &self.map, p.cluster_m, &mut stream)
+        } else {
+            self.clusters.find(&self.particles, total, &self.map)
+        };
+        let clear = clusters.first().is_some_and(|first| {
+            first.probability >= f64::from(p.located_share) && first.sigma_m() <= f64::from(p.located_sigma_m)
+        });
+        self.clear_steps = if clear { self.clear_steps.saturating_add(1) } else { 0 };
+        let state = self.state(&clusters);
+        let (rooms, in_connectors) = self.rooms(total);
+        clusters.retain(|cluster| cluster.probability >= LEAST_SHARE);
+        clusters.truncate(MOST_TOLD);
+        self.estimate = Estimate {
+            time,
+            step,
+            state,
+            clusters,
+            rooms,
+            in_connectors,
+            particles: self.particles.len(),
+            effective,
+            likelihood,
+        };
+    }
+
+    fn state(&self, clusters: &[Cluster]) -> State {
+        let p = &self.parameters;
+        let Some(first) = clusters.first() else { return State::Lost };
+        let sure = f64::from(p.located_share);
+        if p.method == Method::Documented {
+            // One cluster is left (Foot, 5.6).
+            return match (clusters.len(), self.particles.len() <= p.cluster_most) {
+                (1, true) => State::Located,
+                (_, true) => State::SeveralPlaces,
+                _ => State::Searching,
+            };
+        }
+        if self.clear_steps >= p.located_steps {
+            return State::Located;
+        }
+        // Who was located stays so while most of the weight is still in one place of a few metres.
+        let wide = 4.0 * f64::from(p.located_sigma_m);
+        if self.estimate.state == State::Located && first.probability > 0.9 * sure && first.sigma_m() < wide {
+            return State::Located;
+        }
+        let places = clusters.iter().take(5).filter(|cluster| cluster.sigma_m() < wide);
+        let share: f64 = places.map(|cluster| cluster.probability).sum();
+        match self.estimate.state {
+            State::Lost if share < sure => State::Lost,
+            _ if share >= 0.9 * sure => State::SeveralPlaces,
+            _ => State::Searching,
+        }
+    }
+
+    /// The share of each room, and of stairs and elevators.
+    fn rooms(&self, total: f64) -> (Vec<RoomShare>, [f64; 2]) {
+        let mut shares: Vec<Vec<f64>> =
+            self.map.floors.iter().map(|floor| vec![0.0; floor.rooms.outlines().len() + 1]).collect();
+        let mut in_connectors = [0.0; 2];
+        for particle in &self.particles {
+            let floor = &self.map.floors[usize::from(particle.floor)];
+            let point = [particle.x, particle.y];
+            let room = floor.grid.cell(point).and_then(|cell| floor.rooms.at(cell, point));
+            let shares = &mut shares[usize::from(particle.floor)];
+            let place = room.map_or(shares.len() - 1, usize::from);
+            shares[place] += f64::from(particle.weight);
+            if let Some(joint) = self.map.connectors.get(usize::from(particle.connector)) {
+                in_connectors[usize::from(joint.kind == ConnectorKind::Elevator)] += f64::from(particle.weight);
+            }
+        }
+        let mut rooms = Vec::new();
+        for (floor, shares) in self.map.floors.iter().zip(&shares) {
+            for (room, &weight) in shares.iter().enumerate() {
+                let probability = weight / total;
+                if probability >= LEAST_SHARE {
+                    let room = (room + 1 < shares.len()).then_some(room as u16);
+                    rooms.push(RoomShare { floor: floor.number, room, probability });
+                }
+            }
+        }
+        rooms.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        rooms.truncate(MOST_TOLD);
+        (rooms, in_connectors.map(|weight| if total > 0.0 { weight / total } else { 0.0 }))
+    }
+
+    /// What is known after the last step.
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    /// The particles as they are.
+    pub fn particles(&self) -> &[Particle] {
+        &self.particles
+    }
+
+    /// The map it works on.
+    pub fn map(&self) -> &Arc<Map> {
+        &self.map
+    }
+}
+
+/// Gives all together the weight `part`, shared as it was.
+fn weigh(particles: &mut [Particle], part: f32) {
+    let total: f64 = particles.iter().map(|particle| f64::from(particle.weight)).sum();
+    if total > 0.0 {
+        let factor = (f64::from(part) / total) as f32;
+        particles.iter_mut().for_each(|particle| particle.weight *= factor);
+    }
+}
+
+/// Counts the bins that a cloud occupies.
+#[derive(Clone, Debug)]
+struct Bins {
+    /// First bin, lower left corner and columns of each floor.
+    floors: Vec<(usize, [f32; 2], usize, usize)>,
+    /// The number of the count that saw the bin last.
+    seen: Vec<u32>,
+    count: u32,
+}
+
+impl Bins {
+    fn new(map: &Map) -> Self {
+        let mut first = 0;
+        let floors = map
+            .floors
+            .iter()
+            .map(|floor| {
+                let [low, high] = floor.bounds();
+                let size = |axis: usize| ((high[axis] - low[axis]) / BIN_M).ceil() as usize + 1;
+                let (columns, rows) = (size(0), size(1));
+                let start = first;
+                first += columns * rows * BIN_HEADINGS;
+                (start, low, columns, rows)
+            })
+            .collect();
+        Self { floors, seen: vec![0; first], count: 0 }
+    }
+
+    fn occupied(&mut self, particles: &[Particle], least_weight: f32) -> usize {
+        self.count = self.count.wrapping_add(1);
+        if self.count == 0 {
+            self.seen.fill(0);
+            self.count = 1;
+        }
+        let mut occupied = 0;
+        for particle in particles.iter().filter(|particle| particle.weight >= least_weight) {
+            let (start, low, columns, rows) = self.floors[usize::from(particle.floor)];
+            let place = |value: f32, low: f32, count: usize| (((value - low) / BIN_M).max(0.0) as usize).min(count - 1);
+            let (column, row) = (place(particle.x, low[0], columns), place(particle.y, low[1], rows));
+            let turn = (particle.heading / std::f32::consts::TAU + 0.5) * BIN_HEADINGS as f32;
+            let heading = (turn.max(0.0) as usize).min(BIN_HEADINGS - 1);
+            let bin = &mut self.seen[start + (row * columns + column) * BIN_HEADINGS + heading];
+            occupied += usize::from(*bin != self.count);
+            *bin = self.count;
+        }
+        occupied
+    }
+}

@@ -1,0 +1,159 @@
+//! Settings of the particle filter.
+
+use super::Error;
+
+/// How particles move, are weighed and are drawn anew.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// As the document has it: fixed noise, walls that nothing passes, drawing after each step.
+    Documented,
+    /// With the covariance that the step brings, a step-scale of each particle, walls that cost dearly instead of
+    /// everything, and as many particles as the cloud needs.
+    #[default]
+    Covariance,
+}
+
+/// Settings of [`super::ParticleFilter`]. Lengths in metres, angles in radians, unless said otherwise.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Parameters {
+    /// Which of the two.
+    pub method: Method,
+
+    /// Unknown start: spacing of the places (Foot, 5.3: 0.30 m).
+    pub spacing_m: f32,
+    /// Unknown start: headings at each place (16).
+    pub headings: u32,
+    /// Most particles; places are further apart in a building that would need more.
+    pub most: usize,
+    /// Fewest particles (N0; 501).
+    pub least: usize,
+
+    /// Documented: noise of displacement in x and y, and of z and turn, that grows with the change (Phi in 5.14 - 5.17), as
+    /// variances: m², m², rad².
+    pub phi: [f32; 3],
+    /// Documented: noise that is always there (Psi in 5.14 - 5.17), as variances: m², m², rad².
+    pub psi: [f32; 3],
+    /// Documented: standard deviation of the difference of heights (Phi_z in 5.23).
+    pub phi_z_m: f32,
+    /// Documented: how far apart particles of a cluster are at most, in the plane and in height (5 m, 1 m).
+    pub cluster_m: [f32; 2],
+    /// Documented: clusters are not looked for among more particles, since its way to find them is quadratic.
+    pub cluster_most: usize,
+
+    /// Displacement: what a step may be wrong beyond its own covariance (standard deviation).
+    pub place_sigma_m: f32,
+    /// Turn: the same.
+    pub turn_sigma: f32,
+    /// Step scale at the start (standard deviation of a factor).
+    pub scale_sigma: f32,
+    /// Step scale: its change from step to step.
+    pub scale_noise: f32,
+    /// Height of a step on the level (standard deviation).
+    pub level_sigma_m: f32,
+    /// Height of the floor where somebody leaves stairs or an elevator, after all its steps (standard deviation).
+    pub exit_sigma_m: f32,
+    /// The likelihood of what cannot be, a move through a wall for instance: plans and sensors err.
+    pub leak: f32,
+    /// Particles for each occupied bin: the share of the bound of Fox (KLD sampling) for an error of `kld_error`.
+    pub kld_error: f32,
+    /// New particles are drawn when the effective number is below this share of their number.
+    pub resample_below: f32,
+    /// Copies of one particle are set apart by this share of the space that each stands for.
+    pub roughening: f32,
+    /// Logarithm of the odds against the cloud at which it counts as lost.
+    pub lost_odds: f32,
+    /// Located: the leading cluster has at least this share of the weight.
+    pub located_share: f32,
+    /// Located: and at most this standard deviation of the place.
+    pub located_sigma_m: f32,
+    /// Located: for so many steps in a row.
+    pub located_steps: u32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            method: Method::Covariance,
+            spacing_m: 0.3,
+            headings: 16,
+            most: 500_000,
+            least: 2_000,
+            phi: [0.02, 0.01, 0.02],
+            psi: [1e-4, 1e-4, 4e-4],
+            phi_z_m: 0.1,
+            cluster_m: [5.0, 1.0],
+            cluster_most: 10_000,
+            place_sigma_m: 0.02,
+            turn_sigma: 0.3_f32.to_radians(),
+            scale_sigma: 0.01,
+            scale_noise: 0.001,
+            level_sigma_m: 0.08,
+            exit_sigma_m: 0.3,
+            leak: 1e-3,
+            kld_error: 0.05,
+            resample_below: 0.7,
+            roughening: 0.5,
+            lost_odds: 9.0,
+            located_share: 0.98,
+            located_sigma_m: 1.0,
+            located_steps: 3,
+        }
+    }
+}
+
+impl Parameters {
+    /// The settings of the document. Of its noise it gives the form but no figures; these are the project's.
+    pub fn documented() -> Self {
+        Self { method: Method::Documented, least: 501, most: 2_000_000, scale_sigma: 0.0, ..Self::default() }
+    }
+
+    /// # Errors
+    /// Names the first setting that makes no sense.
+    pub fn check(&self) -> Result<(), Error> {
+        let p = self;
+        let between = |name: &'static str, value: f32, low: f32, high: f32| {
+            if (low..=high).contains(&value) { Ok(()) } else { Err(Error::Setting { name, value, low, high }) }
+        };
+        between("spacing_m", p.spacing_m, 0.05, 10.0)?;
+        between("headings", p.headings as f32, 1.0, 360.0)?;
+        between("least", p.least as f32, 10.0, 1e6)?;
+        between("most", p.most as f32, p.least as f32, 1e7)?;
+        for (index, name) in ["phi", "phi (height)", "phi (turn)"].into_iter().enumerate() {
+            between(name, p.phi[index], 0.0, 100.0)?;
+        }
+        for (index, name) in ["psi", "psi (height)", "psi (turn)"].into_iter().enumerate() {
+            between(name, p.psi[index], 0.0, 100.0)?;
+        }
+        between("phi_z_m", p.phi_z_m, 1e-3, 10.0)?;
+        between("cluster_m (plane)", p.cluster_m[0], 0.1, 100.0)?;
+        between("cluster_m (height)", p.cluster_m[1], 0.1, 100.0)?;
+        between("place_sigma_m", p.place_sigma_m, 0.0, 10.0)?;
+        between("turn_sigma", p.turn_sigma, 0.0, 3.0)?;
+        between("scale_sigma", p.scale_sigma, 0.0, 0.5)?;
+        between("scale_noise", p.scale_noise, 0.0, 0.5)?;
+        between("level_sigma_m", p.level_sigma_m, 1e-3, 10.0)?;
+        between("exit_sigma_m", p.exit_sigma_m, 1e-3, 10.0)?;
+        between("leak", p.leak, 1e-9, 0.5)?;
+        between("kld_error", p.kld_error, 0.005, 1.0)?;
+        between("resample_below", p.resample_below, 0.0, 1.0)?;
+        between("roughening", p.roughening, 0.0, 2.0)?;
+        between("lost_odds", p.lost_odds, 1.0, 1e3)?;
+        between("located_share", p.located_share, 0.5, 1.0)?;
+        between("located_sigma_m", p.located_sigma_m, 0.01, 100.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_sets_make_sense_and_nonsense_is_named() {
+        Parameters::default().check().unwrap();
+        Parameters::documented().check().unwrap();
+        let nonsense = Parameters { leak: f32::NAN, ..Parameters::default() };
+        assert!(nonsense.check().unwrap_err().to_string().contains("leak"));
+    }
+}
