@@ -169,6 +169,23 @@ fn an_unknown_start_is_found_and_not_before_it_can_be_known() {
 }
 
 #[test]
+fn the_past_is_better_known_than_it_was() {
+    let truth = stances(&tour(), 1.0);
+    let mut filter = ParticleFilter::new(building(), &Parameters::default(), &Start::Anywhere, 1).unwrap();
+    let then = errors(&mut filter, &truth, &steps(&truth, 1));
+    let past = filter.past();
+    // The steps count from 1, as do the stances after the start.
+    let off = |place: &sohle::particle::PastPlace| {
+        (nalgebra::Vector3::from(place.position) - truth[place.step as usize].place).xy().norm()
+    };
+    let first = past[0].step as usize;
+    assert!(first < 25, "remembered from step {first} only");
+    let now = past.iter().map(off).sum::<f64>() / past.len() as f64;
+    let then = then[first - 1..].iter().map(|(_, error, _)| error).sum::<f64>() / past.len() as f64;
+    assert!(now < 0.5 * then && now < 0.3, "{now} against {then}");
+}
+
+#[test]
 fn somebody_carried_away_is_found_again() {
     for seed in 0..5 {
         let truth = stances(&tour(), 1.0);

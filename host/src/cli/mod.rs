@@ -5,6 +5,7 @@
 //! the standard error output, and an error ends the program with one line and exit code 1 (2 if the command line itself
 //! was wrong).
 
+pub mod bench;
 pub mod calibrate;
 pub mod command;
 pub mod convert;
@@ -50,6 +51,7 @@ enum Command {
     Convert(convert::Args),
     Evaluate(evaluate::Args),
     Endurance(endurance::Args),
+    Bench(bench::Args),
     Line(line::Args),
     Live(live::Args),
     #[command(name = "command")]
@@ -91,6 +93,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Endurance(args) => endurance::run(args),
+        Command::Bench(args) => bench::run(args),
         Command::Line(args) => line::run(args),
         Command::Live(args) => live::run(args),
         Command::Ask(args) => command::run(args),

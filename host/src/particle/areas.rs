@@ -68,6 +68,12 @@ impl Areas {
         Some(self.outlines[entry.outline as usize].0)
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        let corners: usize = self.outlines.iter().map(|(_, outline)| outline.len()).sum();
+        corners * size_of::<[f32; 2]>() + self.starts.len() * size_of::<u32>() + self.entries.len() * size_of::<Entry>()
+    }
+
     /// Every area.
     pub fn outlines(&self) -> &[(u16, Outline)] {
         &self.outlines

@@ -1,6 +1,7 @@
 //! The particle filter: from steps to a place in the building.
 
 use super::Error;
+use super::ancestry::{Ancestry, PastPlace};
 use super::cloud::Particle;
 use super::cluster::{self, Cluster, Clusters};
 use super::estimate::{Estimate, RoomShare, State};
@@ -24,6 +25,10 @@ const LEAST_SHARE: f64 = 1e-3;
 const MOST_TOLD: usize = 50;
 /// What a step would be worth to a cloud that lies anywhere: about half of all moves meet no wall.
 const ANYWHERE_LIKELIHOOD: f64 = 0.5;
+/// A larger cloud is no place yet, and its past would take more room than it is worth.
+const MOST_REMEMBERED: usize = 20_000;
+/// What lies this near to the likeliest place belongs to it. **Units:** m.
+const NEAR_M: f64 = 3.0;
 /// How fast somebody may have gone whose steps are missing. **Units:** m/s.
 const FASTEST_M_S: f32 = 1.8;
 /// How far a missing step may have led. **Units:** m.
@@ -46,6 +51,9 @@ pub struct ParticleFilter {
     drawn: Vec<Particle>,
     clusters: Clusters,
     bins: Bins,
+    ancestry: Ancestry,
+    /// The past from before particles were sown anew.
+    settled: Vec<PastPlace>,
     /// Counts the steps of this filter.
     number: u64,
     previous: Option<(u32, Micros)>,
@@ -97,6 +105,8 @@ impl ParticleFilter {
             seed,
             drawn: Vec::new(),
             clusters: Clusters::default(),
+            ancestry: Ancestry::default(),
+            settled: Vec::new(),
             bins: Bins::new(&map),
             map,
             number: 0,
@@ -112,8 +122,12 @@ impl ParticleFilter {
         Ok(filter)
     }
 
-    /// Takes in a step; returns what is known after it.
+    /// Takes in a step; returns what is known after it. A step that is no number counts as one that is missing.
     pub fn step(&mut self, step: &Step) -> &Estimate {
+        let numbers = step.displacement.iter().chain(step.covariance.iter()).chain([&step.turn]);
+        if !numbers.into_iter().all(|value| value.is_finite()) {
+            return &self.estimate;
+        }
         self.number += 1;
         let documented = self.parameters.method == Method::Documented;
         if !documented {
@@ -122,12 +136,13 @@ impl ParticleFilter {
         self.previous = Some((step.index, step.stance_end));
         let moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
         let likelihood = moved.likelihood();
-        if documented {
-            self.draw_documented(&moved);
+        let parents = if documented {
+            self.draw_documented(&moved)
         } else {
             self.judge(likelihood);
-            self.draw(&moved);
-        }
+            self.draw(&moved)
+        };
+        self.remember(parents.as_deref(), step.index);
         let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
         self.tell(Some(step.stance_end), step.index, total, moved.effective(), likelihood);
         &self.estimate
@@ -191,6 +206,9 @@ impl ParticleFilter {
         let mut sown = everywhere.particles;
         weigh(&mut sown, 1.0 - AROUND_PART - believed);
         weigh(&mut around, AROUND_PART);
+        // Who was sown has no forebears: what is known of the past will not become better.
+        self.settled = self.past();
+        self.ancestry.clear();
         self.particles.append(&mut around);
         self.particles.append(&mut sown);
         // Weights near 1 on average, as after drawing.
@@ -201,20 +219,48 @@ impl ParticleFilter {
     }
 
     /// Draws as the document does: after each step, as many as are left, but not fewer than N0 (5.24).
-    fn draw_documented(&mut self, moved: &Moved) {
+    fn draw_documented(&mut self, moved: &Moved) -> Option<Vec<usize>> {
         let count = moved.alive.max(self.parameters.least);
         let mut stream = Stream::new(self.seed, Purpose::Draw, self.number, 0);
-        if resampling::draw(&self.particles, count, &mut stream, &mut self.drawn, |_| {}) > 0 {
-            std::mem::swap(&mut self.particles, &mut self.drawn);
+        let mut parents = Vec::with_capacity(count);
+        let sink = |parent| parents.push(parent);
+        if resampling::draw(&self.particles, count, &mut stream, &mut self.drawn, sink) == 0 {
+            return None;
+        }
+        std::mem::swap(&mut self.particles, &mut self.drawn);
+        Some(parents)
+    }
+
+    /// Keeps the past, as soon as the cloud is small enough for it.
+    fn remember(&mut self, parents: Option<&[usize]>, step: u32) {
+        if self.particles.len() > MOST_REMEMBERED {
+            self.settled = self.past();
+            self.ancestry.clear();
+        } else {
+            self.ancestry.grow(&self.particles, parents, step);
         }
     }
 
+    /// Where the likeliest hypothesis has been, corrected by all that was learned since: from the first step that is
+    /// remembered. While the cloud is large, nothing is added.
+    pub fn past(&self) -> Vec<PastPlace> {
+        let mut past = self.settled.clone();
+        if let Some(place) = self.estimate.place() {
+            let reach = NEAR_M.max(3.0 * place.sigma_m());
+            past.extend(self.ancestry.past(&self.particles, |particle| {
+                let at = nalgebra::Vector3::new(particle.x, particle.y, particle.z).map(f64::from);
+                (place.position - at).norm() <= reach
+            }));
+        }
+        past
+    }
+
     /// Draws when too few particles carry the weight, or when fewer would do.
-    fn draw(&mut self, moved: &Moved) {
+    fn draw(&mut self, moved: &Moved) -> Option<Vec<usize>> {
         if !(moved.after > 0.0 && moved.after.is_finite()) {
             // Nothing but what cannot be: all alike.
             self.particles.iter_mut().for_each(|particle| particle.weight = 1.0);
-            return;
+            return None;
         }
         let p = &self.parameters;
         let mean = moved.after / self.particles.len() as f64;
@@ -227,7 +273,7 @@ impl ParticleFilter {
         if !(few || fewer || more) {
             let factor = (1.0 / mean) as f32;
             self.particles.iter_mut().for_each(|particle| particle.weight *= factor);
-            return;
+            return None;
         }
         let before = self.particles.len();
         let mut stream = Stream::new(self.seed, Purpose::Draw, self.number, 0);
@@ -239,6 +285,7 @@ impl ParticleFilter {
         let survived = (moved.effective() / before as f64).min(1.0);
         self.spread.volume *= survived.max(different as f64 / before as f64);
         self.roughen(&parents);
+        Some(parents)
     }
 
     /// Sets copies of one particle apart within the space that it stood for.

@@ -27,6 +27,8 @@ pub(super) struct Grid {
     walls: Vec<Wall>,
     /// Distance from the nearest point of a cell to the nearest wall, rounded down. **Units:** [`DISTANCE_UNIT_M`].
     clear: Vec<u8>,
+    /// Walls that were given.
+    count: usize,
 }
 
 impl Grid {
@@ -60,7 +62,8 @@ impl Grid {
             sorted.extend(cell.iter().map(|&index| walls[index as usize]));
             starts.push(sorted.len() as u32);
         }
-        let mut grid = Self { origin, columns, rows, starts, walls: sorted, clear: vec![0; cells.len()] };
+        let mut grid =
+            Self { origin, columns, rows, starts, walls: sorted, clear: vec![0; cells.len()], count: walls.len() };
         grid.measure(walls);
         grid
     }
@@ -110,6 +113,16 @@ impl Grid {
     /// Number of cells.
     pub fn len(&self) -> usize {
         self.clear.len()
+    }
+
+    /// Walls, each counted once.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        self.walls.len() * size_of::<Wall>() + self.starts.len() * size_of::<u32>() + self.clear.len()
     }
 
     /// Columns and rows.

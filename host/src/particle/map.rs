@@ -171,6 +171,14 @@ impl Map {
         floor.rooms.at(floor.grid.cell(point)?, point)
     }
 
+    /// Bytes that walls and areas take.
+    pub fn bytes(&self) -> usize {
+        let floor = |floor: &Floor| {
+            floor.grid.bytes() + floor.connectors.bytes() + floor.rooms.bytes() + floor.inside.cells.len()
+        };
+        self.floors.iter().map(floor).sum()
+    }
+
     /// Whether the straight way between two points of a floor, given by its index, meets a wall.
     pub fn blocked(&self, floor: usize, a: [f32; 2], b: [f32; 2]) -> bool {
         self.floors.get(floor).is_none_or(|floor| floor.grid.blocked(a, b))

@@ -13,6 +13,7 @@
 //! # Source
 //! Foot, chapter 5; where its formulas slip, SPEC section 8, decisions 3 to 6.
 
+mod ancestry;
 mod areas;
 mod cloud;
 pub mod cluster;
@@ -25,8 +26,10 @@ mod motion;
 pub mod parameters;
 mod random;
 mod resampling;
+pub mod speed;
 pub mod start;
 
+pub use ancestry::PastPlace;
 pub use areas::Outline;
 pub use cloud::Particle;
 pub use error::Error;

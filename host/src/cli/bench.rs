@@ -1,0 +1,160 @@
+//! `sohle bench`: what the particle filter costs on this machine.
+
+use super::table::Table;
+use super::{Error, print};
+use crate::particle::speed::{Work, building};
+use clap::ValueEnum;
+use std::time::{Duration, Instant};
+
+/// Times the particle filter: moves, drawing, clusters, a whole step, over particles, walls and floors
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Each figure is the median of several runs. The reference is a textbook's move without walls, in the same \
+run: the ratio to it can be compared between machines, times cannot.\n\nExample:\n  sohle bench --runs 21"
+)]
+pub struct Args {
+    /// Runs of each part
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1_000))]
+    runs: u32,
+    /// How the result is written
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Table,
+    Json,
+}
+
+/// A building and a cloud to time.
+struct Case {
+    floors: u16,
+    rooms: u16,
+    particles: usize,
+}
+
+const CASES: [Case; 7] = [
+    Case { floors: 2, rooms: 6, particles: 10_000 },
+    Case { floors: 2, rooms: 6, particles: 100_000 },
+    Case { floors: 6, rooms: 6, particles: 100_000 },
+    Case { floors: 6, rooms: 20, particles: 100_000 },
+    Case { floors: 6, rooms: 40, particles: 100_000 },
+    Case { floors: 6, rooms: 20, particles: 200_000 },
+    Case { floors: 6, rooms: 20, particles: 500_000 },
+];
+
+/// What was measured of one case. **Units:** as the names say.
+#[derive(serde::Serialize)]
+struct Row {
+    particles: usize,
+    floors: u16,
+    walls_per_floor: usize,
+    /// Millions of moves with walls in a second, on one core.
+    moves_one_core: f64,
+    /// On two.
+    moves_two_cores: f64,
+    /// The reference, without walls, on one core.
+    reference: f64,
+    draw_ms: f64,
+    clusters_ms: f64,
+    /// Move, drawing and clusters, on two cores.
+    step_ms: f64,
+    memory_mb: f64,
+}
+
+/// Times and tells.
+pub fn run(args: Args) -> Result<(), Error> {
+    let mut rows = Vec::new();
+    let bar = super::progress(CASES.len() as u64, "timing", false);
+    for case in &CASES {
+        rows.push(measure(case, args.runs)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    match args.format {
+        Format::Table => print(&table(&rows).text()),
+        Format::Json => print(&format!("{}\n", serde_json::to_string_pretty(&rows)?)),
+    }
+}
+
+fn measure(case: &Case, runs: u32) -> Result<Row, Error> {
+    let mut work = Work::new(building(case.floors, case.rooms)?, case.particles)?;
+    let pool = |threads| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|error| Error::new(format!("cannot start {threads} threads: {error}")))
+    };
+    let (one, two) = (pool(1)?, pool(2)?);
+    let millions = |time: Duration| case.particles as f64 / time.as_secs_f64() / 1e6;
+    let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    let reference = millions(median(runs, &mut work, |work| _ = work.reference()));
+    let moves_one_core = millions(median(runs, &mut work, |work| _ = one.install(|| work.moves())));
+    let moves_two_cores = millions(median(runs, &mut work, |work| _ = two.install(|| work.moves())));
+    let draw_ms = ms(median(runs, &mut work, |work| _ = work.draw(case.particles)));
+    let clusters_ms = ms(median(runs, &mut work, |work| _ = work.clusters()));
+    let step = median(runs, &mut work, |work| {
+        two.install(|| work.moves());
+        work.draw(case.particles);
+        work.clusters();
+    });
+    Ok(Row {
+        particles: case.particles,
+        floors: case.floors,
+        walls_per_floor: work.walls(),
+        moves_one_core,
+        moves_two_cores,
+        reference,
+        draw_ms,
+        clusters_ms,
+        step_ms: ms(step),
+        memory_mb: work.bytes() as f64 / 1e6,
+    })
+}
+
+/// The median time of some work, each time on the cloud as it was at the start.
+fn median(runs: u32, work: &mut Work, part: impl Fn(&mut Work)) -> Duration {
+    let mut times: Vec<Duration> = (0..runs)
+        .map(|_| {
+            work.renew();
+            let start = Instant::now();
+            part(work);
+            start.elapsed()
+        })
+        .collect();
+    times.sort_unstable();
+    times[times.len() / 2]
+}
+
+fn table(rows: &[Row]) -> Table {
+    let headings = [
+        "floors",
+        "walls/floor",
+        "M moves/s, 1 core",
+        "2 cores",
+        "reference",
+        "ratio",
+        "draw ms",
+        "clusters ms",
+        "step ms",
+        "MB",
+    ];
+    let mut table = Table::new("particles", &headings);
+    for row in rows {
+        let cells = vec![
+            row.floors.to_string(),
+            row.walls_per_floor.to_string(),
+            format!("{:.1}", row.moves_one_core),
+            format!("{:.1}", row.moves_two_cores),
+            format!("{:.1}", row.reference),
+            format!("{:.2}", row.moves_one_core / row.reference),
+            format!("{:.2}", row.draw_ms),
+            format!("{:.2}", row.clusters_ms),
+            format!("{:.1}", row.step_ms),
+            format!("{:.1}", row.memory_mb),
+        ];
+        table.row(row.particles.to_string(), cells);
+    }
+    table
+}

@@ -1,0 +1,232 @@
+//! Where the particles came from: the past, corrected by all that was learned since.
+//!
+//! Each particle remembers its forebears. Whatever hypothesis dies takes its past with it, so that what is left tells where
+//! the person has been, as far as it is known now: a room that was doubtful when it was entered is sure when it is left.
+//!
+//! Most particles share most of their past. It is kept as a tree; a branch without living particles is cut off. That takes
+//! room for the steps and for some times the number of particles, however long the walk.
+//!
+//! # Source
+//! Jacob, Murray and Rubenthaler, "Path storage in the particle filter", Statistics and Computing 25, 2015.
+
+use super::cloud::Particle;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// A place of a particle after a step.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    place: [f32; 3],
+    floor: u16,
+    /// Number of the step.
+    step: u32,
+    parent: u32,
+    /// Nodes that follow it, and 1 if it is a particle's present.
+    children: u32,
+}
+
+/// The corrected past at one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PastPlace {
+    /// Index of the step, as it was given to [`Ancestry::grow`].
+    pub step: u32,
+    /// Mean. **Units:** m; **Frame:** building.
+    pub position: [f64; 3],
+    /// Standard deviation in the plane. **Units:** m.
+    pub sigma_m: f64,
+    /// Index of the floor that has most of the weight.
+    pub floor: usize,
+}
+
+/// The tree of forebears.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ancestry {
+    nodes: Vec<Node>,
+    free: Vec<u32>,
+    /// The node of each particle.
+    leaves: Vec<u32>,
+}
+
+impl Ancestry {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.nodes.clear();
+        self.free.clear();
+        self.leaves.clear();
+    }
+
+    /// All particles have gone a step; particle `i` comes from the one that was `parents[i]` before, or from `i` itself
+    /// when there are no `parents`.
+    pub fn grow(&mut self, particles: &[Particle], parents: Option<&[usize]>, step: u32) {
+        let before = std::mem::take(&mut self.leaves);
+        for (i, particle) in particles.iter().enumerate() {
+            let parent = parents.map_or(Some(i), |parents| parents.get(i).copied());
+            let parent = parent.and_then(|parent| before.get(parent).copied()).unwrap_or(NONE);
+            if let Some(node) = self.nodes.get_mut(parent as usize) {
+                node.children += 1;
+            }
+            let place = [particle.x, particle.y, particle.z];
+            let node = Node { place, floor: particle.floor, step, parent, children: 1 };
+            let index = match self.free.pop() {
+                Some(index) => {
+                    self.nodes[index as usize] = node;
+                    index
+                }
+                None => {
+                    self.nodes.push(node);
+                    (self.nodes.len() - 1) as u32
+                }
+            };
+            self.leaves.push(index);
+        }
+        for leaf in before {
+            self.release(leaf);
+        }
+    }
+
+    /// One that held the node does not any more.
+    fn release(&mut self, mut index: u32) {
+        while let Some(node) = self.nodes.get_mut(index as usize) {
+            node.children -= 1;
+            if node.children > 0 {
+                return;
+            }
+            self.free.push(index);
+            index = node.parent;
+        }
+    }
+
+    /// The past of the particles for which `belongs` holds, from the oldest step.
+    pub fn past(&self, particles: &[Particle], belongs: impl Fn(&Particle) -> bool) -> Vec<PastPlace> {
+        let mut weights = vec![0.0_f64; self.nodes.len()];
+        for (particle, &leaf) in particles.iter().zip(&self.leaves) {
+            if belongs(particle) {
+                weights[leaf as usize] += f64::from(particle.weight);
+            }
+        }
+        let mut living: Vec<u32> = (0..self.nodes.len() as u32).collect();
+        let mut dead = vec![false; self.nodes.len()];
+        self.free.iter().for_each(|&index| dead[index as usize] = true);
+        living.retain(|&index| !dead[index as usize]);
+        // Children before their parents, which gather their weights.
+        living.sort_unstable_by_key(|&index| std::cmp::Reverse((self.nodes[index as usize].step, index)));
+        let mut past = Vec::new();
+        for same in living.chunk_by(|&a, &b| self.nodes[a as usize].step == self.nodes[b as usize].step) {
+            for &index in same {
+                if let Some(weight) = weights.get(self.nodes[index as usize].parent as usize).copied() {
+                    weights[self.nodes[index as usize].parent as usize] = weight + weights[index as usize];
+                }
+            }
+            past.extend(self.mean(same, &weights));
+        }
+        past.reverse();
+        past
+    }
+
+    fn mean(&self, nodes: &[u32], weights: &[f64]) -> Option<PastPlace> {
+        let (mut total, mut sum, mut squares) = (0.0, [0.0; 3], 0.0);
+        let mut floors: Vec<f64> = Vec::new();
+        let first = self.nodes[*nodes.first()? as usize];
+        for &index in nodes {
+            let (node, weight) = (&self.nodes[index as usize], weights[index as usize]);
+            let offset: [f64; 3] = std::array::from_fn(|axis| f64::from(node.place[axis] - first.place[axis]));
+            total += weight;
+            for axis in 0..3 {
+                sum[axis] += weight * offset[axis];
+            }
+            squares += weight * (offset[0] * offset[0] + offset[1] * offset[1]);
+            let floor = usize::from(node.floor);
+            if floors.len() <= floor {
+                floors.resize(floor + 1, 0.0);
+            }
+            floors[floor] += weight;
+        }
+        if !(total > 0.0) {
+            return None;
+        }
+        let mean = sum.map(|value| value / total);
+        let variance = squares / total - mean[0] * mean[0] - mean[1] * mean[1];
+        Some(PastPlace {
+            step: first.step,
+            position: std::array::from_fn(|axis| f64::from(first.place[axis]) + mean[axis]),
+            sigma_m: variance.max(0.0).sqrt(),
+            floor: (0..floors.len()).max_by(|&a, &b| floors[a].total_cmp(&floors[b])).unwrap_or_default(),
+        })
+    }
+
+    /// Nodes that are in use.
+    #[cfg(test)]
+    fn len(&self) -> usize {
+        self.nodes.len() - self.free.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{Purpose, Stream};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn at(x: f32) -> Particle {
+        Particle { x, weight: 1.0, ..Particle::default() }
+    }
+
+    #[test]
+    fn what_died_is_not_in_the_past() {
+        let mut ancestry = Ancestry::default();
+        ancestry.grow(&[at(0.0), at(10.0)], None, 1);
+        ancestry.grow(&[at(1.0), at(11.0)], None, 2);
+        let now = [at(2.0), at(2.5)];
+        ancestry.grow(&now, Some(&[0, 0]), 3);
+        let past = ancestry.past(&now, |_| true);
+        assert_eq!(past.iter().map(|place| place.position[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.25]);
+        assert_eq!(past.iter().map(|place| place.step).collect::<Vec<_>>(), [1, 2, 3]);
+        assert!((past[2].sigma_m - 0.25).abs() < 1e-9);
+        // The node of each step on the way, and two at its end.
+        assert_eq!(ancestry.len(), 4);
+        let one = ancestry.past(&now, |particle| particle.x > 2.2);
+        assert_eq!(one[2].position[0], 2.5);
+    }
+
+    #[test]
+    fn an_hour_of_steps_stays_small() {
+        let mut ancestry = Ancestry::default();
+        let particles = vec![at(0.0); 1_000];
+        let mut stream = Stream::new(1, Purpose::Draw, 0, 0);
+        for step in 0..3_600 {
+            let parents: Vec<usize> = (0..1_000).map(|_| (stream.unit() * 1_000.0) as usize).collect();
+            ancestry.grow(&particles, Some(&parents), step);
+        }
+        // All have one forebear some 2 000 steps ago (Kingman's coalescent: twice their number); before that there is one
+        // node for each step, after it about twice their number times its logarithm.
+        assert!(ancestry.len() < 3_600 + 30 * 1_000, "{}", ancestry.len());
+        assert_eq!(ancestry.past(&particles, |_| true).len(), 3_600);
+    }
+
+    proptest! {
+        #[test]
+        fn the_tree_tells_what_whole_paths_would(
+            draws in proptest::collection::vec(proptest::collection::vec((0_usize..6, -5.0_f32..5.0), 6), 1..30),
+        ) {
+            let mut ancestry = Ancestry::default();
+            let mut paths: Vec<Vec<f32>> = vec![Vec::new(); 6];
+            let mut particles = Vec::new();
+            for (step, draw) in draws.iter().enumerate() {
+                let parents: Vec<usize> = draw.iter().map(|&(parent, _)| parent).collect();
+                particles = draw.iter().map(|&(_, x)| at(x)).collect();
+                paths = draw.iter().map(|&(parent, x)| [&paths[parent][..], &[x]].concat()).collect();
+                ancestry.grow(&particles, (step > 0).then_some(&parents[..]), step as u32);
+            }
+            if draws.len() == 1 {
+                paths.iter_mut().zip(&particles).for_each(|(path, particle)| *path = vec![particle.x]);
+            }
+            let past = ancestry.past(&particles, |_| true);
+            prop_assert_eq!(past.len(), draws.len());
+            for (step, place) in past.iter().enumerate() {
+                let mean = paths.iter().map(|path| f64::from(path[step])).sum::<f64>() / 6.0;
+                prop_assert!((place.position[0] - mean).abs() < 1e-5, "{} {}", place.position[0], mean);
+            }
+        }
+    }
+}
