@@ -1,5 +1,6 @@
 //! The laptop's side of Sohle: the wire to the shoe, recordings, simulation, tracks, scores.
 
+pub mod building;
 pub mod calibration;
 pub mod cli;
 pub mod evaluation;
@@ -7,6 +8,7 @@ pub mod export;
 pub mod gravity;
 pub mod link;
 pub mod particle;
+pub mod phone;
 pub mod recording;
 pub mod simulation;
 pub mod toml_file;

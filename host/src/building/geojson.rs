@@ -1,0 +1,359 @@
+//! The project's own format: GeoJSON, with all floors in one file, as any GIS shows and edits it.
+//!
+//! A feature collection (RFC 7946) with the foreign member `sohle_building`:
+//! ```json
+//! {"version": 1, "name": "House", "georeference": {"kind": "utm", "epsg": 32632, "origin": [566500, 5932800]},
+//!  "floors": [{"number": 0, "name": "EG", "height_m": 0.0}]}
+//! ```
+//! Every feature has the properties `kind` and `floor`: `wall` (lines), `door` (a line of two points), `room` (a polygon,
+//! with `name` and `usage`), `stairs`, `ramp`, `elevator` (a polygon for each floor; those of one `name` belong together; the
+//! first may have `way`, a list of x, y, z in metres), `entrance` (a point, with `name`). Coordinates are longitude and
+//! latitude; of a building that is somewhere (`"kind": "local"`) they are metres, and `crs_note` says so.
+
+use super::error::Error;
+use super::features::{self, RawFeature};
+use super::geometry::{Outline, Point, Segment};
+use super::georeference::{Georeference, Projection};
+use super::model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Room};
+use serde_json::{Value, json};
+
+/// The foreign member that makes a feature collection a building.
+const MEMBER: &str = "sohle_building";
+/// Of the format.
+const VERSION: u32 = 1;
+
+/// What the foreign member holds.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    version: u32,
+    name: String,
+    georeference: Georeference,
+    floors: Vec<FloorHeader>,
+}
+
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FloorHeader {
+    number: i32,
+    name: String,
+    height_m: f64,
+}
+
+/// The building of a text; `file` names it in errors.
+///
+/// # Errors
+/// When the text is not of the format, a feature makes no sense, or the parts do not make a building.
+pub fn parse(text: &str, file: &str) -> Result<Building, Error> {
+    let collection = features::collection(text, file)?;
+    let wrong = |what: String| Error::Format { file: file.to_owned(), format: "Sohle building", what };
+    let header = collection.foreign_members.as_ref().and_then(|members| members.get(MEMBER)).cloned();
+    let header = header.ok_or_else(|| wrong(format!("it has no member '{MEMBER}'")))?;
+    let header: Header = serde_json::from_value(header).map_err(|error| wrong(format!("'{MEMBER}': {error}")))?;
+    if header.version != VERSION {
+        return Err(wrong(format!("it is of version {}, this program reads version {VERSION}", header.version)));
+    }
+    let mut building = Building {
+        name: header.name,
+        georeference: header.georeference,
+        floors: header
+            .floors
+            .into_iter()
+            .map(|floor| Floor { number: floor.number, name: floor.name, height_m: floor.height_m, ..Floor::default() })
+            .collect(),
+        ..Building::default()
+    };
+    let projection = building.georeference.projection()?;
+    for mut feature in features::features(collection, file)? {
+        if let Some(projection) = &projection {
+            project(&mut feature, projection).map_err(|error| feature.error(file, error.to_string()))?;
+        }
+        add(&mut building, &feature).map_err(|what| feature.error(file, what))?;
+    }
+    building.assembled()
+}
+
+/// Into the frame of the building.
+pub(super) fn project(feature: &mut RawFeature, projection: &Projection) -> Result<(), Error> {
+    let lines = feature.lines.iter_mut().chain(feature.polygons.iter_mut().flatten());
+    for point in feature.points.iter_mut().chain(lines.flatten()) {
+        *point = projection.to_building(*point)?;
+    }
+    Ok(())
+}
+
+fn add(building: &mut Building, feature: &RawFeature) -> Result<(), String> {
+    let kind = feature.text("kind").ok_or("it has no 'kind'")?;
+    let number = feature.integer("floor").ok_or("it has no 'floor' that is a whole number")?;
+    let name = feature.text("name");
+    let outline = || match &feature.polygons[..] {
+        [polygon] => polygon.first().cloned().ok_or_else(|| "its polygon is empty".to_owned()),
+        _ => Err(format!("a {kind} is one polygon")),
+    };
+    let floor = building.floors.iter_mut().find(|floor| floor.number == number);
+    let Some(floor) = floor else { return Err(format!("floor {number} is not among the floors of '{MEMBER}'")) };
+    if let Some(kind) = ConnectorKind::ALL.into_iter().find(|other| other.word() == kind) {
+        let name = name.ok_or_else(|| format!("{} need a 'name' that joins their floors", kind.word()))?;
+        return add_connector(&mut building.connectors, feature, kind, name, number, outline()?);
+    }
+    match &kind[..] {
+        "wall" => {
+            if feature.lines.iter().all(|line| line.len() < 2) {
+                return Err("a wall is made of lines".to_owned());
+            }
+            let pieces = feature.lines.iter().flat_map(|line| line.windows(2));
+            floor.walls.extend(pieces.map(|pair| [pair[0], pair[1]]));
+        }
+        "door" => match &feature.lines[..] {
+            [line] if line.len() == 2 => floor.doors.push(Door { line: [line[0], line[1]], name }),
+            _ => return Err("a door is a line of two points".to_owned()),
+        },
+        "room" => floor.rooms.push(Room {
+            name: name.ok_or("a room needs a 'name'")?,
+            usage: feature.text("usage"),
+            outline: outline()?,
+        }),
+        "entrance" => match feature.points[..] {
+            [place] => {
+                let name = name.ok_or("an entrance needs a 'name'")?;
+                building.entrances.push(Entrance { name, floor: number, place });
+            }
+            _ => return Err("an entrance is a point".to_owned()),
+        },
+        other => {
+            return Err(format!("'{other}' is no kind: wall, door, room, stairs, ramp, elevator and entrance are"));
+        }
+    }
+    Ok(())
+}
+
+fn add_connector(
+    connectors: &mut Vec<Connector>,
+    feature: &RawFeature,
+    kind: ConnectorKind,
+    name: String,
+    floor: i32,
+    outline: Outline,
+) -> Result<(), String> {
+    let way = match feature.properties.get("way") {
+        None => Vec::new(),
+        Some(way) => serde_json::from_value(way.clone()).map_err(|error| format!("'way': {error}"))?,
+    };
+    match connectors.iter_mut().find(|other| other.name == name) {
+        None => connectors.push(Connector { name, kind, outlines: vec![(floor, outline)], way }),
+        Some(other) if other.kind != kind => {
+            return Err(format!("'{name}' is {} and {}", other.kind.word(), kind.word()));
+        }
+        Some(other) => {
+            other.outlines.push((floor, outline));
+            if other.way.is_empty() {
+                other.way = way;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The text of a building: one feature for all walls of a floor, one for each other part. Coordinates are rounded to the
+/// millimetre, or to what a tenth of one is in degrees.
+///
+/// # Errors
+/// For an EPSG code that is no UTM zone.
+pub fn write(building: &Building) -> Result<String, Error> {
+    let place = Placer { projection: building.georeference.projection()? };
+    let mut features = Vec::new();
+    for floor in &building.floors {
+        features.push(feature(
+            "wall",
+            floor.number,
+            None,
+            json!({
+                "type": "MultiLineString",
+                "coordinates": place.lines(&floor.walls)?,
+            }),
+        ));
+        for door in &floor.doors {
+            let line = door.line.iter().map(|point| place.point(*point)).collect::<Result<Vec<_>, _>>()?;
+            let geometry = json!({"type": "LineString", "coordinates": line});
+            features.push(feature("door", floor.number, door.name.as_deref(), geometry));
+        }
+        for room in &floor.rooms {
+            let mut room_feature = feature("room", floor.number, Some(&room.name), place.polygon(&room.outline)?);
+            if let Some(usage) = &room.usage {
+                room_feature["properties"]["usage"] = json!(usage);
+            }
+            features.push(room_feature);
+        }
+    }
+    for connector in &building.connectors {
+        for (index, (floor, outline)) in connector.outlines.iter().enumerate() {
+            let geometry = place.polygon(outline)?;
+            let mut part = feature(connector.kind.word(), *floor, Some(&connector.name), geometry);
+            if index == 0 && !connector.way.is_empty() {
+                let way: Vec<_> = connector.way.iter().map(|point| point.map(millimetres)).collect();
+                part["properties"]["way"] = json!(way);
+            }
+            features.push(part);
+        }
+    }
+    for entrance in &building.entrances {
+        let geometry = json!({"type": "Point", "coordinates": place.point(entrance.place)?});
+        features.push(feature("entrance", entrance.floor, Some(&entrance.name), geometry));
+    }
+    let header = Header {
+        version: VERSION,
+        name: building.name.clone(),
+        georeference: building.georeference,
+        floors: building
+            .floors
+            .iter()
+            .map(|floor| FloorHeader { number: floor.number, name: floor.name.clone(), height_m: floor.height_m })
+            .collect(),
+    };
+    let header = json!(header).to_string();
+    let note = if place.projection.is_none() { "\"crs_note\": \"metres, x east, y north\",\n" } else { "" };
+    // A feature to a line: differences of two versions of a building can be read.
+    let lines: Vec<_> = features.iter().map(Value::to_string).collect();
+    Ok(format!(
+        "{{\"type\": \"FeatureCollection\",\n\"{MEMBER}\": {header},\n{note}\"features\": [\n{}\n]}}\n",
+        lines.join(",\n")
+    ))
+}
+
+fn feature(kind: &str, floor: i32, name: Option<&str>, geometry: Value) -> Value {
+    let mut properties = json!({"kind": kind, "floor": floor});
+    if let Some(name) = name {
+        properties["name"] = json!(name);
+    }
+    json!({"type": "Feature", "properties": properties, "geometry": geometry})
+}
+
+fn millimetres(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// Writes places as the file has them.
+struct Placer {
+    projection: Option<Projection>,
+}
+
+impl Placer {
+    fn point(&self, point: Point) -> Result<Point, Error> {
+        match &self.projection {
+            None => Ok(point.map(millimetres)),
+            Some(projection) => Ok(projection.to_earth(point)?.map(|degrees| (degrees * 1e9).round() / 1e9)),
+        }
+    }
+
+    /// Walls that go on from one to the next become one line.
+    fn lines(&self, walls: &[Segment]) -> Result<Vec<Vec<Point>>, Error> {
+        let mut lines: Vec<Vec<Point>> = Vec::new();
+        let mut end = None;
+        for wall in walls {
+            if end != Some(wall[0]) {
+                lines.push(vec![self.point(wall[0])?]);
+            }
+            if let Some(line) = lines.last_mut() {
+                line.push(self.point(wall[1])?);
+            }
+            end = Some(wall[1]);
+        }
+        Ok(lines)
+    }
+
+    fn polygon(&self, outline: &[Point]) -> Result<Value, Error> {
+        let mut ring = outline.iter().map(|point| self.point(*point)).collect::<Result<Vec<_>, _>>()?;
+        ring.extend(ring.first().copied());
+        Ok(json!({"type": "Polygon", "coordinates": [ring]}))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn house(georeference: Georeference, corner: f64) -> Building {
+        let square = vec![[0.0, 0.0], [corner, 0.0], [corner, 4.5], [0.0, 4.5]];
+        let floor = |number: i32| Floor {
+            number,
+            name: format!("F{number}"),
+            height_m: 3.5 * f64::from(number),
+            walls: vec![[[0.0, 0.0], [corner, 0.0]], [[corner, 0.0], [corner, 4.5]], [[1.0, 1.0], [2.0, 1.0]]],
+            doors: vec![Door { line: [[0.0, 1.0], [0.0, 2.0]], name: (number == 0).then(|| "front".to_owned()) }],
+            rooms: vec![Room { name: "a \"room\"".into(), usage: Some("office".into()), outline: square.clone() }],
+        };
+        let connector = |name: &str, kind, way| Connector {
+            name: name.to_owned(),
+            kind,
+            outlines: vec![(0, square.clone()), (1, square.clone())],
+            way,
+        };
+        Building {
+            name: "House".into(),
+            georeference,
+            floors: vec![floor(0), floor(1)],
+            connectors: vec![
+                connector("s1", ConnectorKind::Stairs, vec![[0.5, 0.5, 0.0], [0.5, 4.0, 3.5]]),
+                connector("e1", ConnectorKind::Elevator, Vec::new()),
+            ],
+            entrances: vec![Entrance { name: "main".into(), floor: 0, place: [0.0, 1.5] }],
+        }
+        .assembled()
+        .unwrap()
+    }
+
+    #[test]
+    fn a_local_building_is_read_as_it_was_written() {
+        let building = house(Georeference::Local, 5.125);
+        let text = write(&building).unwrap();
+        assert_eq!(parse(&text, "house").unwrap(), building);
+        assert!(text.contains("crs_note"));
+    }
+
+    proptest! {
+        #[test]
+        fn a_building_on_earth_is_read_to_a_tenth_of_a_millimetre(
+            longitude in -179.0_f64..179.0, latitude in -80.0_f64..80.0, corner in 1.0_f64..100.0,
+        ) {
+            let building = house(Georeference::around(longitude, latitude).unwrap(), corner);
+            let back = parse(&write(&building).unwrap(), "house").unwrap();
+            prop_assert_eq!(back.georeference, building.georeference);
+            prop_assert_eq!(back.floors.len(), 2);
+            for (a, b) in building.floors.iter().flat_map(Floor::points).zip(back.floors.iter().flat_map(Floor::points)) {
+                prop_assert!((a[0] - b[0]).abs() < 2e-4 && (a[1] - b[1]).abs() < 2e-4, "{:?} {:?}", a, b);
+            }
+            prop_assert_eq!(back.connectors.len(), 2);
+        }
+
+        #[test]
+        fn no_text_panics(text in ".{0,200}", cut in 0_usize..2_000) {
+            let _ = parse(&text, "x");
+            let whole = write(&house(Georeference::Local, 5.0)).unwrap();
+            let cut: String = whole.chars().take(cut).collect();
+            if cut.len() + 3 < whole.len() {
+                prop_assert!(parse(&cut, "x").is_err());
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_feature() {
+        let text = write(&house(Georeference::Local, 5.0)).unwrap();
+        let message = |from: &str, to: &str| parse(&text.replacen(from, to, 1), "h.geojson").unwrap_err().to_string();
+        assert_eq!(
+            message("\"kind\":\"door\"", "\"kind\":\"dor\""),
+            "h.geojson, feature 2: 'dor' is no kind: wall, door, room, stairs, ramp, elevator and entrance are"
+        );
+        assert_eq!(
+            message("\"floor\":0,\"kind\":\"door\"", "\"floor\":7,\"kind\":\"door\""),
+            "h.geojson, feature 2: floor 7 is not among the floors of 'sohle_building'"
+        );
+        assert_eq!(message("sohle_building", "x"), "h.geojson is no Sohle building: it has no member 'sohle_building'");
+        assert_eq!(
+            message("\"version\":1", "\"version\":2"),
+            "h.geojson is no Sohle building: it is of version 2, this program reads version 1"
+        );
+        assert!(message("\"type\": \"FeatureCollection\"", "\"type\": \"Fea\"").starts_with("h.geojson is no GeoJSON"));
+    }
+}

@@ -1,0 +1,180 @@
+//! Reads floor plans as poslab (HafenCity University Hamburg) keeps them: one GeoJSON file a floor, longitude and latitude,
+//! polygons with IFC classes.
+//!
+//! Walls and facades are solid: their borders are walls. Doors lie in walls as polygons of their own; what of a wall lies
+//! within a door is taken out. Spaces are rooms; staircases and elevators join floors where they lie above each other.
+
+use super::error::Error;
+use super::features::{self, RawFeature};
+use super::geojson::project;
+use super::geometry::{self, Outline, Point, Segment};
+use super::georeference::Georeference;
+use super::model::{Building, Connector, ConnectorKind, Door, Floor, Room};
+
+/// A floor file.
+#[derive(Clone, Debug)]
+pub struct FloorFile<'a> {
+    /// Number of the floor.
+    pub number: i32,
+    /// What it is called.
+    pub name: &'a str,
+    /// Above the origin. **Units:** m.
+    pub height_m: f64,
+    /// The text of the file.
+    pub text: &'a str,
+    /// Its name in errors.
+    pub file: &'a str,
+}
+
+/// Doors reach so far beyond the walls that they open. **Units:** m.
+const DOOR_REACH_M: f64 = 0.12;
+/// Centres of a staircase on two floors are no farther apart. **Units:** m.
+const ABOVE_M: f64 = 4.0;
+
+/// The building of some floors. The origin is a corner of the first.
+///
+/// # Errors
+/// When a text is no GeoJSON of this dialect, or the floors do not make a building.
+pub fn parse(name: &str, files: &[FloorFile<'_>]) -> Result<Building, Error> {
+    let mut building = Building { name: name.to_owned(), ..Building::default() };
+    for file in files {
+        let mut features = features::features(features::collection(file.text, file.file)?, file.file)?;
+        if building.georeference == Georeference::Local {
+            let points = features.iter().flat_map(|feature| feature.polygons.iter().flatten().flatten().copied());
+            let Some([low, _]) = geometry::bounds(points) else { continue };
+            building.georeference = Georeference::around(low[0], low[1])?;
+        }
+        if let Some(projection) = building.georeference.projection()? {
+            for feature in &mut features {
+                project(feature, &projection).map_err(|error| feature.error(file.file, error.to_string()))?;
+            }
+        }
+        building.floors.push(floor(file, &features)?);
+        connect(&mut building.connectors, file.number, &features);
+    }
+    // What is on one floor only joins nothing.
+    building.connectors.retain(|connector| connector.outlines.len() > 1);
+    building.assembled()
+}
+
+fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> {
+    let mut floor =
+        Floor { number: file.number, name: file.name.to_owned(), height_m: file.height_m, ..Floor::default() };
+    let mut doors: Vec<Outline> = Vec::new();
+    for feature in features {
+        let class = feature.text("ifc_class").ok_or_else(|| feature.error(file.file, "it has no 'ifc_class'"))?;
+        let outlines =
+            feature.polygons.iter().filter_map(|polygon| polygon.first()).filter(|outline| outline.len() > 2);
+        match &class.to_lowercase()[..] {
+            "ifcwall" | "ifcfacade" => {
+                floor.walls.extend(feature.polygons.iter().flatten().flat_map(|ring| geometry::sides(ring)));
+            }
+            "ifcdoor" => {
+                for outline in outlines {
+                    if let Some(line) = geometry::middle_line(outline) {
+                        floor.doors.push(Door { line, name: feature.text("spaceID").filter(|name| name != "Door") });
+                        doors.push(grown(outline, DOOR_REACH_M));
+                    }
+                }
+            }
+            _ => {
+                let usage = feature.text("usage").filter(|usage| usage != "Empty");
+                let name = feature.text("spaceID").filter(|name| name != "Empty");
+                for outline in outlines {
+                    if let Some(name) = name.clone().or_else(|| usage.clone()) {
+                        floor.rooms.push(Room { name, usage: usage.clone(), outline: outline.clone() });
+                    }
+                }
+            }
+        }
+    }
+    for door in &doors {
+        let Some([low, high]) = geometry::bounds(door.iter().copied()) else { continue };
+        let near = |wall: &Segment| {
+            (0..2).all(|axis| {
+                wall[0][axis].min(wall[1][axis]) <= high[axis] && wall[0][axis].max(wall[1][axis]) >= low[axis]
+            })
+        };
+        let (cut, kept): (Vec<Segment>, Vec<Segment>) = floor.walls.iter().partition(|wall| near(wall));
+        floor.walls = kept;
+        floor.walls.extend(cut.iter().flat_map(|wall| geometry::outside_of(wall, door)));
+    }
+    Ok(floor)
+}
+
+/// An outline whose corners are moved away from its middle.
+fn grown(outline: &[Point], by: f64) -> Outline {
+    let middle = geometry::centre(outline);
+    let away = |point: &Point| {
+        let far = geometry::distance(middle, *point).max(1e-6);
+        geometry::between(middle, *point, 1.0 + by / far)
+    };
+    outline.iter().map(away).collect()
+}
+
+/// Joins staircases and elevators with those of the floors before.
+fn connect(connectors: &mut Vec<Connector>, floor: i32, features: &[RawFeature]) {
+    for feature in features {
+        let usage = feature.text("usage").unwrap_or_default().to_lowercase();
+        let kind = match &usage[..] {
+            "staircase" | "stairs" | "srairs" => ConnectorKind::Stairs,
+            "elevator" => ConnectorKind::Elevator,
+            _ => continue,
+        };
+        for outline in feature.polygons.iter().filter_map(|polygon| polygon.first()).filter(|outline| outline.len() > 2)
+        {
+            let middle = geometry::centre(outline);
+            let above = connectors.iter_mut().find(|connector| {
+                let last = connector.outlines.last();
+                connector.kind == kind
+                    && last.is_some_and(|(other, below)| {
+                        *other != floor && geometry::distance(geometry::centre(below), middle) < ABOVE_M
+                    })
+            });
+            match above {
+                Some(connector) => connector.outlines.push((floor, outline.clone())),
+                None => connectors.push(Connector {
+                    name: format!("{}-{}", kind.word(), connectors.len() + 1),
+                    kind,
+                    outlines: vec![(floor, outline.clone())],
+                    way: Vec::new(),
+                }),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_door_opens_the_wall_it_lies_in() {
+        // A wall of 8.9 m by 0.2 m, and a door of 0.9 m in its middle.
+        let degrees = |x: f64, y: f64| [10.0 + x / 66_400.0, 53.5 + y / 111_300.0];
+        let ring = |low: [f64; 2], high: [f64; 2]| {
+            let corners =
+                [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]], [low[0], low[1]]];
+            serde_json::json!([corners.map(|[x, y]| degrees(x, y))])
+        };
+        let feature = |class: &str, usage: &str, ring: serde_json::Value| {
+            serde_json::json!({"type": "Feature", "properties": {"ifc_class": class, "usage": usage, "spaceID": "4 001"},
+                "geometry": {"type": "Polygon", "coordinates": ring}})
+        };
+        let text = serde_json::json!({"type": "FeatureCollection", "features": [
+            feature("IfcWall", "Wall", ring([0.0, 0.0], [8.9, 0.2])),
+            feature("IfcDoor", "Door", ring([4.0, 0.0], [4.9, 0.2])),
+            feature("IfcSpace", "Office", ring([0.0, 0.2], [8.9, 5.0])),
+        ]})
+        .to_string();
+        let file = FloorFile { number: 4, name: "4OG", height_m: 0.0, text: &text, file: "4OG.geojson" };
+        let building = parse("house", &[file]).unwrap();
+        let floor = &building.floors[0];
+        let total: f64 = floor.walls.iter().map(geometry::length).sum();
+        // Both long sides lose the door and its reach on both sides of it.
+        assert!((total - (2.0 * 8.9 + 2.0 * 0.2 - 2.0 * (0.9 + 2.0 * DOOR_REACH_M))).abs() < 0.1, "{total}");
+        assert!((geometry::length(&floor.doors[0].line) - 0.9).abs() < 0.01);
+        assert_eq!((floor.rooms[0].name.as_str(), floor.rooms[0].usage.as_deref()), ("4 001", Some("Office")));
+        assert!(matches!(building.georeference, Georeference::Utm { epsg: 32_632, .. }));
+    }
+}

@@ -1,0 +1,20 @@
+//! The building: what every method that uses a map works on.
+//!
+//! A [`Building`] has floors with walls, doors and rooms, and what joins the floors: stairs, ramps, elevators. All formats
+//! become one: [`geojson`] is the project's own, which any GIS shows and edits; each other reader is a file of its own.
+//!
+//! # Frame
+//! x east, y north, z up from the origin of the building, in metres. [`Georeference`] tells where that is.
+
+pub mod error;
+mod features;
+pub mod geojson;
+pub mod geometry;
+pub mod georeference;
+pub mod hcu;
+mod model;
+pub mod xyz10;
+
+pub use error::Error;
+pub use georeference::Georeference;
+pub use model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Room};
