@@ -8,11 +8,13 @@
 
 pub mod error;
 mod features;
+pub mod generate;
 pub mod geojson;
 pub mod geometry;
 pub mod georeference;
 pub mod hcu;
 mod model;
+pub mod route;
 pub mod xyz10;
 
 pub use error::Error;

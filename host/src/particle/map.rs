@@ -3,6 +3,7 @@
 use super::Error;
 use super::areas::{Areas, Outline};
 use super::grid::{Grid, Wall};
+use crate::building::{self, Building};
 
 /// What joins floors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,6 +145,39 @@ impl Map {
         Ok(Self { floors, connectors: joints })
     }
 
+    /// The map of a building.
+    ///
+    /// # Errors
+    /// As [`Map::new`]; a [`Building`] that was checked has none but for its size.
+    pub fn of(building: &Building) -> Result<Self, Error> {
+        let point = |point: [f64; 2]| point.map(|value| value as f32);
+        let outline = |outline: &building::geometry::Outline| outline.iter().copied().map(point).collect::<Outline>();
+        let plan = |floor: &building::Floor| {
+            let walls: Vec<Wall> = floor.walls.iter().map(|wall| wall.map(point)).collect();
+            let doors = floor.doors.iter().map(|door| door.line.map(point));
+            Plan {
+                number: floor.number,
+                height: floor.height_m as f32,
+                closed: walls.iter().copied().chain(doors).collect(),
+                walls,
+                rooms: floor.rooms.iter().map(|room| outline(&room.outline)).collect(),
+            }
+        };
+        let index = |number: i32| building.floors.iter().position(|floor| floor.number == number);
+        let connector = |connector: &building::Connector| Connector {
+            kind: match connector.kind {
+                building::ConnectorKind::Stairs | building::ConnectorKind::Ramp => ConnectorKind::Stairs,
+                building::ConnectorKind::Elevator => ConnectorKind::Elevator,
+            },
+            outlines: connector
+                .outlines
+                .iter()
+                .filter_map(|(number, corners)| Some((index(*number)?, outline(corners))))
+                .collect(),
+        };
+        Self::new(building.floors.iter().map(plan).collect(), building.connectors.iter().map(connector).collect())
+    }
+
     /// The index of the floor with this number.
     pub fn floor(&self, number: i32) -> Option<usize> {
         self.floors.iter().position(|floor| floor.number == number)
@@ -226,16 +260,18 @@ impl Floor {
             (lower, upper) = ([0.0; 2], [0.0; 2]);
         }
         let grid = Grid::new(&plan.walls, lower, upper);
-        let inside = Inside::new(&plan.closed, lower, upper);
+        let mut inside = Inside::new(&plan.closed, lower, upper);
         let rooms = plan.rooms.into_iter().enumerate().map(|(number, outline)| (number as u16, outline)).collect();
-        Self {
-            number: plan.number,
-            height: plan.height,
-            connectors: Areas::new(connectors, &grid),
-            rooms: Areas::new(rooms, &grid),
-            grid,
-            inside,
+        let (connectors, rooms) = (Areas::new(connectors, &grid), Areas::new(rooms, &grid));
+        // A plan whose outer walls leave gaps is known by its rooms.
+        let named =
+            |point| grid.cell(point).is_some_and(|cell| rooms.at(cell, point).or(connectors.at(cell, point)).is_some());
+        for cell in 0..inside.cells.len() {
+            if !inside.cells[cell] && named(inside.centre(cell)) {
+                inside.cells[cell] = true;
+            }
         }
+        Self { number: plan.number, height: plan.height, connectors, rooms, grid, inside }
     }
 
     /// The lower left and the upper right corner. **Units:** m.

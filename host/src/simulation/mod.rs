@@ -50,6 +50,7 @@
 pub mod dies;
 pub mod error;
 pub mod gait;
+mod in_building;
 pub mod jet;
 pub mod motion;
 pub mod mounting;

@@ -1,0 +1,353 @@
+//! Buildings made for evaluation: a twin of the document's, and a large one.
+
+use super::geometry::{Outline, Point, Segment};
+use super::model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Room};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::Rng;
+
+/// Width of a door. **Units:** m.
+const DOOR_M: f64 = 1.0;
+/// Floor to floor: 20 risers of 0.18 m. **Units:** m.
+const STOREY_M: f64 = 3.6;
+/// Width and depth of a staircase. **Units:** m.
+const STAIRS_M: [f64; 2] = [4.0, 6.0];
+/// Length of a flight: ten treads of 0.28 m. **Units:** m.
+const FLIGHT_M: f64 = 2.8;
+
+fn rectangle([x, y]: Point, [far_x, far_y]: Point) -> Outline {
+    vec![[x, y], [far_x, y], [far_x, far_y], [x, far_y]]
+}
+
+/// A floor that is being drawn.
+struct Drawing {
+    floor: Floor,
+}
+
+impl Drawing {
+    fn new(number: i32) -> Self {
+        let name = format!("F{number}");
+        Self { floor: Floor { number, name, height_m: STOREY_M * f64::from(number), ..Floor::default() } }
+    }
+
+    fn wall(&mut self, a: Point, b: Point) {
+        self.floor.walls.push([a, b]);
+    }
+
+    /// A wall along x or y with gaps in it: middle and width of each, in order. `doors` closes them.
+    fn wall_with_gaps(&mut self, a: Point, b: Point, gaps: &[(f64, f64)], doors: bool) {
+        let axis = usize::from(a[0] == b[0]);
+        let at = |place: f64| if axis == 0 { [place, a[1]] } else { [a[0], place] };
+        let mut from = a[axis];
+        for &(middle, width) in gaps {
+            let (low, high) = (middle - width / 2.0, middle + width / 2.0);
+            self.wall(at(from), at(low));
+            if doors {
+                self.floor.doors.push(Door { line: [at(low), at(high)], name: None });
+            }
+            from = high;
+        }
+        self.wall(at(from), at(b[axis]));
+    }
+
+    fn room(&mut self, name: impl Into<String>, usage: &str, low: Point, high: Point) {
+        self.floor.rooms.push(Room { name: name.into(), usage: Some(usage.to_owned()), outline: rectangle(low, high) });
+    }
+
+    /// Rooms side by side from x = `from` on, `widths` wide, between the `corridor` and the `outer` wall, each with a door to
+    /// the corridor.
+    fn row(&mut self, from: f64, widths: &[f64], corridor: f64, outer: f64, mut name: impl FnMut(usize) -> String) {
+        let mut west = from;
+        let mut doors = Vec::new();
+        for (index, width) in widths.iter().enumerate() {
+            let east = west + width;
+            self.room(name(index), "office", [west, corridor.min(outer)], [east, corridor.max(outer)]);
+            if index > 0 {
+                self.wall([west, corridor], [west, outer]);
+            }
+            // Not in the middle: where it is tells the rooms apart.
+            doors.push((west + 0.35 * width, DOOR_M));
+            west = east;
+        }
+        self.wall([from, corridor], [from, outer]);
+        self.wall([west, corridor], [west, outer]);
+        self.wall([from, outer], [west, outer]);
+        self.wall_with_gaps([from, corridor], [west, corridor], &doors, true);
+    }
+
+    /// A staircase north of the corridor at y = `corridor`, from x = `west` on: open to the corridor, two flights with a wall
+    /// between them. `ends` says whether it ends on the lowest and on the highest floor: there nobody gets under or over
+    /// the flight.
+    fn staircase(&mut self, west: f64, corridor: f64, lowest: bool, highest: bool) {
+        let [width, depth] = STAIRS_M;
+        let (east, north, middle) = (west + width, corridor + depth, west + width / 2.0);
+        let (front, back) = flights(corridor);
+        self.wall([west, corridor], [west, north]);
+        self.wall([east, corridor], [east, north]);
+        self.wall([west, north], [east, north]);
+        self.wall_with_gaps([west, corridor], [east, corridor], &[(middle, 3.0)], false);
+        self.wall([middle, front], [middle, back]);
+        if lowest {
+            self.wall([west, front], [middle, front]);
+        }
+        if highest {
+            self.wall([middle, front], [east, front]);
+        }
+    }
+
+    /// An elevator with its door to the east.
+    fn elevator(&mut self, low: Point, high: Point) {
+        self.wall(low, [high[0], low[1]]);
+        self.wall([low[0], high[1]], high);
+        self.wall(low, [low[0], high[1]]);
+        self.wall_with_gaps([high[0], low[1]], high, &[((low[1] + high[1]) / 2.0, DOOR_M)], true);
+    }
+}
+
+/// Where the flights of a staircase begin and end, from the wall of the corridor.
+fn flights(corridor: f64) -> (f64, f64) {
+    let front = corridor + 1.4;
+    (front, front + FLIGHT_M)
+}
+
+/// The staircase of [`Drawing::staircase`] as a connector of floors 0 to `floors` - 1.
+fn stairs(name: &str, west: f64, corridor: f64, floors: i32) -> Connector {
+    let [width, depth] = STAIRS_M;
+    let outline = rectangle([west, corridor], [west + width, corridor + depth]);
+    let (front, back) = flights(corridor);
+    let (up, down) = (west + 0.75 * width, west + 0.25 * width);
+    let landing = back + 0.9;
+    let mut way = Vec::new();
+    for floor in 0..floors - 1 {
+        let low = STOREY_M * f64::from(floor);
+        let half = low + STOREY_M / 2.0;
+        way.extend([
+            [up, front - 0.5, low],
+            [up, front, low],
+            [up, back, half],
+            [up, landing, half],
+            [down, landing, half],
+            [down, back, half],
+            [down, front, low + STOREY_M],
+            [down, front - 0.5, low + STOREY_M],
+        ]);
+    }
+    let outlines = (0..floors).map(|floor| (floor, outline.clone())).collect();
+    Connector { name: name.to_owned(), kind: ConnectorKind::Stairs, outlines, way }
+}
+
+fn elevator(name: &str, low: Point, high: Point, floors: i32) -> Connector {
+    let outlines = (0..floors).map(|floor| (floor, rectangle(low, high))).collect();
+    Connector { name: name.to_owned(), kind: ConnectorKind::Elevator, outlines, way: Vec::new() }
+}
+
+/// What the evaluation of the document needs (Foot, chapter 7): two floors of 805 m² (141 120 particles each), wings that are
+/// mirror images of each other, a staircase in each, an elevator, and a hall in the middle. More floors are like the upper
+/// one.
+pub fn twin(floors: i32) -> Building {
+    const WING: f64 = 20.0;
+    const HALL: f64 = 12.0;
+    const SOUTH: f64 = 6.0;
+    const NORTH: f64 = 8.2;
+    const DEEP: f64 = NORTH + STAIRS_M[1];
+    const HALL_DEEP: f64 = 19.75;
+    let (east, whole) = (WING + HALL, 2.0 * WING + HALL);
+    let cabin = ([WING, 15.0], [WING + 2.0, 17.2]);
+    let floor = |number: i32| {
+        let mut drawing = Drawing::new(number);
+        let widths = [3.2, 4.8, 4.0, 3.6, 4.4];
+        let mirrored: Vec<f64> = widths.iter().rev().copied().collect();
+        let name =
+            move |wing: &'static str, first: usize| move |index: usize| format!("{wing}{number}{}", first + index);
+        drawing.row(0.0, &widths, SOUTH, 0.0, name("W", 1));
+        drawing.row(east, &mirrored, SOUTH, 0.0, name("E", 1));
+        let (north, north_mirrored) = ([4.0, 4.6, 3.4, 4.0], [4.0, 3.4, 4.6, 4.0]);
+        drawing.row(0.0, &north, NORTH, DEEP, name("W", 6));
+        drawing.row(east + STAIRS_M[0], &north_mirrored, NORTH, DEEP, name("E", 6));
+        for west in [WING - STAIRS_M[0], east] {
+            drawing.staircase(west, NORTH, number == 0, number == floors - 1);
+        }
+        drawing.room(format!("corridor-W{number}"), "corridor", [0.0, SOUTH], [WING, NORTH]);
+        drawing.room(format!("corridor-E{number}"), "corridor", [east, SOUTH], [whole, NORTH]);
+        drawing.wall([0.0, SOUTH], [0.0, NORTH]);
+        drawing.wall([whole, SOUTH], [whole, NORTH]);
+        // The hall, open to both corridors.
+        drawing.room(
+            if number == 0 { "hall".to_owned() } else { format!("hall-{number}") },
+            "hall",
+            [WING, 0.0],
+            [east, HALL_DEEP],
+        );
+        for x in [WING, east] {
+            drawing.wall([x, DEEP], [x, HALL_DEEP]);
+        }
+        drawing.wall([WING, HALL_DEEP], [east, HALL_DEEP]);
+        if number == 0 {
+            drawing.wall_with_gaps([WING, 0.0], [east, 0.0], &[(WING + HALL / 2.0, 1.8)], true);
+        } else {
+            drawing.wall([WING, 0.0], [east, 0.0]);
+        }
+        drawing.elevator(cabin.0, cabin.1);
+        drawing.floor
+    };
+    let building = Building {
+        name: "Twin".to_owned(),
+        floors: (0..floors).map(floor).collect(),
+        connectors: vec![
+            stairs("stairs-W", WING - STAIRS_M[0], NORTH, floors),
+            stairs("stairs-E", east, NORTH, floors),
+            elevator("elevator-1", cabin.0, cabin.1, floors),
+        ],
+        entrances: vec![Entrance { name: "main".to_owned(), floor: 0, place: [WING + HALL / 2.0, 0.3] }],
+        ..Building::default()
+    };
+    made(building)
+}
+
+/// Six floors of 10 000 m² each with some sixteen hundred rooms: corridors along x with rooms of random widths on both sides,
+/// joined by one across, four staircases and two elevators.
+pub fn large(seed: u64) -> Building {
+    const FLOORS: i32 = 6;
+    const STRIPS: usize = 5;
+    const STRIP: f64 = 16.0;
+    const ROOM: f64 = 6.7;
+    const LONG: f64 = 125.0;
+    const ACROSS: [f64; 2] = [60.0, 65.0];
+    let mut random = Pcg64Mcg::new(u128::from(seed) << 1 | 1);
+    let mut unit = move || (random.next_u32() >> 8) as f64 / f64::from(1 << 24);
+    let cabins = [0.0, 4.0 * STRIP].map(|y| ([ACROSS[0], y + 0.5], [ACROSS[0] + 2.0, y + 2.7]));
+    let mut floors = Vec::new();
+    for number in 0..FLOORS {
+        let mut drawing = Drawing::new(number);
+        for strip in 0..STRIPS {
+            let south = STRIP * strip as f64;
+            let (low, high) = (south + ROOM, south + STRIP - ROOM);
+            let with_stairs = strip == 0 || strip == STRIPS - 1;
+            for (side, from, to) in [("W", 0.0, ACROSS[0]), ("E", ACROSS[1], LONG)] {
+                // South of the corridor rooms only; north of it a staircase beside the way across in the outer strips.
+                for (row, corridor, outer) in [("S", low, south), ("N", high, south + STRIP)] {
+                    let (mut west, mut east) = (from, to);
+                    if row == "N" && with_stairs {
+                        if side == "W" {
+                            east -= STAIRS_M[0];
+                            drawing.staircase(east, high, number == 0, number == FLOORS - 1);
+                            drawing.wall([east, high + STAIRS_M[1]], [east, outer]);
+                        } else {
+                            drawing.staircase(west, high, number == 0, number == FLOORS - 1);
+                            west += STAIRS_M[0];
+                            drawing.wall([west, high + STAIRS_M[1]], [west, outer]);
+                        }
+                    }
+                    let widths = widths(east - west, &mut unit);
+                    drawing.row(west, &widths, corridor, outer, |index| {
+                        format!("{number}{}{side}{row}{:02}", strip + 1, index + 1)
+                    });
+                }
+                drawing.room(format!("corridor-{number}{}{side}", strip + 1), "corridor", [from, low], [to, high]);
+                let end = if side == "W" { from } else { to };
+                drawing.wall([end, low], [end, high]);
+            }
+            // Between the strips the way across has its own walls where no room ends.
+        }
+        let top = STRIP * STRIPS as f64;
+        drawing.room(format!("across-{number}"), "corridor", [ACROSS[0], 0.0], [ACROSS[1], top]);
+        drawing.wall([ACROSS[0], top], [ACROSS[1], top]);
+        for y in [0.0, 4.0 * STRIP].map(|south| south + STRIP - ROOM + STAIRS_M[1]) {
+            for x in ACROSS {
+                drawing.wall([x, y], [x, y + ROOM - STAIRS_M[1]]);
+            }
+        }
+        if number == 0 {
+            drawing.wall_with_gaps([ACROSS[0], 0.0], [ACROSS[1], 0.0], &[(ACROSS[0] + 3.5, 1.8)], true);
+        } else {
+            drawing.wall([ACROSS[0], 0.0], [ACROSS[1], 0.0]);
+        }
+        for (low, high) in cabins {
+            drawing.elevator(low, high);
+        }
+        floors.push(drawing.floor);
+    }
+    let north = STRIP - ROOM;
+    let mut connectors = Vec::new();
+    for (strip, south) in [(1, 0.0), (STRIPS, 4.0 * STRIP)] {
+        connectors.push(stairs(&format!("stairs-{strip}W"), ACROSS[0] - STAIRS_M[0], south + north, FLOORS));
+        connectors.push(stairs(&format!("stairs-{strip}E"), ACROSS[1], south + north, FLOORS));
+    }
+    for (index, (low, high)) in cabins.into_iter().enumerate() {
+        connectors.push(elevator(&format!("elevator-{}", index + 1), low, high, FLOORS));
+    }
+    let entrances = vec![Entrance { name: "main".to_owned(), floor: 0, place: [ACROSS[0] + 3.5, 0.3] }];
+    made(Building { name: "Large".to_owned(), floors, connectors, entrances, ..Building::default() })
+}
+
+/// Widths of rooms from 3 m to 9 m that fill `length`.
+fn widths(length: f64, unit: &mut impl FnMut() -> f64) -> Vec<f64> {
+    let mut widths = Vec::new();
+    let mut left = length;
+    while left > 12.0 {
+        let width = ((3.0 + 6.0 * unit() * unit()) * 10.0).round() / 10.0;
+        widths.push(width);
+        left -= width;
+    }
+    let halves = [(left * 5.0).round() / 10.0, 0.0];
+    widths.extend([halves[0], left - halves[0]]);
+    widths
+}
+
+/// Walls that lie twice on each other are drawn once.
+fn made(mut building: Building) -> Building {
+    for floor in &mut building.floors {
+        let mut walls: Vec<Segment> = Vec::new();
+        for mut wall in std::mem::take(&mut floor.walls) {
+            if wall[1] < wall[0] {
+                wall.swap(0, 1);
+            }
+            if wall[0] != wall[1] && !walls.contains(&wall) {
+                walls.push(wall);
+            }
+        }
+        floor.walls = walls;
+    }
+    building.assembled().expect("a generated building is whole; the tests make each")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::particle::Map;
+
+    #[test]
+    fn the_twin_is_as_large_as_the_document_has_it_and_symmetric() {
+        let building = twin(2);
+        let map = Map::of(&building).unwrap();
+        let inside = |floor: usize| {
+            let places = (0..260).flat_map(|i| (0..100).map(move |j| [0.1 + 0.2 * i as f32, 0.1 + 0.2 * j as f32]));
+            places.filter(|&place| map.is_inside(floor, place)).count() as f64 * 0.04
+        };
+        // 141 120 particles, 16 for each 0.09 m²: 794 m².
+        for floor in 0..2 {
+            assert!((inside(floor) - 794.0).abs() < 25.0, "{}", inside(floor));
+        }
+        // Every wall has a mirror image, but for the elevator and the doors that are not in the middle.
+        let plain = |wall: &&Segment| wall[0][0] == wall[1][0] && (wall[0][0] < 20.0 || wall[0][0] > 32.0);
+        let near = |a: Point, b: Point| (a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9;
+        let walls = &building.floors[0].walls;
+        for wall in walls.iter().filter(plain) {
+            let mirrored = wall.map(|[x, y]| [52.0 - x, y]);
+            assert!(walls.iter().any(|other| near(other[0], mirrored[0]) && near(other[1], mirrored[1])), "{wall:?}");
+        }
+    }
+
+    #[test]
+    fn the_large_one_is_large() {
+        let building = large(1);
+        assert_eq!(building.floors.len(), 6);
+        let rooms: usize = building.floors.iter().map(|floor| floor.rooms.len()).sum();
+        assert!((1_200..2_000).contains(&rooms), "{rooms}");
+        let [low, high] = building.bounds().unwrap();
+        assert!(((high[0] - low[0]) * (high[1] - low[1]) - 10_000.0).abs() < 1.0);
+        assert_eq!(building, large(1));
+        assert!(building.floors[0].walls != large(2).floors[0].walls);
+        let text = super::super::geojson::write(&building).unwrap();
+        assert!(text.len() < 1_500_000, "{}", text.len());
+    }
+}
