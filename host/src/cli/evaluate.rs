@@ -1,7 +1,10 @@
 //! `sohle evaluate`: every recording of a manifest tracked and judged.
 
-use super::{Error, parameters, print};
+use super::suite as table;
+use super::{Error, parameters, print, progress};
+use crate::evaluation::building::suite;
 use crate::evaluation::{Manifest, Perturbation, Report, Settings, evaluate};
+use crate::particle;
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +17,15 @@ pub struct Args {
     /// What to run and what is known of it; the project's own tests/recordings.toml when left out
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
+    /// Simulated walks in generated buildings in place of recordings
+    #[arg(long, value_enum, conflicts_with_all = ["manifest", "parameters", "only", "perturb"])]
+    suite: Option<Suite>,
+    /// Walks from an unknown start in the suite 'building'
+    #[arg(long, value_name = "N", default_value_t = 200, requires = "suite")]
+    walks: usize,
+    /// All that is random in a suite follows from it
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "suite")]
+    seed: u64,
     /// How to print the scores
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -29,6 +41,15 @@ pub struct Args {
     /// Threads to run on; the number changes no result
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
+}
+
+/// Walks that are made for an evaluation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Suite {
+    /// The evaluation of the document (Foot, chapter 7) in a twin of its building
+    FootDocument,
+    /// Many walks from an unknown start on three floors, and walks of which a part is missing
+    Building,
 }
 
 /// How the scores are printed.
@@ -50,6 +71,9 @@ fn project_manifest() -> PathBuf {
 
 /// Tracks, judges, prints.
 pub fn run(args: Args) -> Result<(), Error> {
+    if let Some(suite) = args.suite {
+        return in_pool(args.threads, || run_suite(suite, &args))?;
+    }
     let manifest =
         Manifest::read(&args.manifest.unwrap_or_else(project_manifest))?.only(&args.only).map_err(Error::new)?;
     let parameters = args.parameters.as_deref().map(parameters::read).transpose()?;
@@ -59,15 +83,13 @@ pub fn run(args: Args) -> Result<(), Error> {
         Some(named) if named.is_empty() => Perturbation::value_variants().to_vec(),
         Some(named) => named,
     };
-    let threads = args.threads.map_or(0, std::num::NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    let report = pool.install(|| Report {
+    let report = in_pool(args.threads, || Report {
         evaluation: evaluate(&manifest, &settings, Perturbation::Recorded),
         perturbed: perturbations
             .into_iter()
             .map(|perturbation| (perturbation, evaluate(&manifest, &settings, perturbation)))
             .collect(),
-    });
+    })?;
     match args.format {
         Format::Table => print(&report.table())?,
         Format::Json => print(&report.json()?)?,
@@ -80,4 +102,41 @@ pub fn run(args: Args) -> Result<(), Error> {
         [] => Ok(()),
         failed => Err(Error::new(format!("{} recordings failed: {}", failed.len(), failed.join(", ")))),
     }
+}
+
+/// Does the work on so many threads.
+fn in_pool<T: Send>(threads: Option<std::num::NonZeroUsize>, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
+    let threads = threads.map_or(0, std::num::NonZeroUsize::get);
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(work))
+}
+
+fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
+    let default = particle::Parameters::default();
+    let (mut text, json) = match which {
+        Suite::FootDocument => {
+            let (known, others) = (suite::known(&default, args.seed)?, suite::others(&default, args.seed)?);
+            let text = [table::known(&known), table::others(&others)].map(|table| table.text()).join("\n");
+            (text, serde_json::json!({"known": known, "others": others}))
+        }
+        Suite::Building => {
+            let documented = particle::Parameters::documented();
+            let bar = progress(6 * args.walks as u64, "walks", false);
+            let done = || bar.inc(1);
+            let walks = suite::random_walks(args.walks, args.seed, done)?;
+            let (mut unknown, mut lost) = (Vec::new(), Vec::new());
+            for (name, parameters) in [("documented", &documented), ("default", &default)] {
+                unknown.push(suite::unknown(name, parameters, &walks, done)?);
+                lost.extend(suite::lost(name, parameters, &walks, done)?);
+            }
+            bar.finish_and_clear();
+            let mut tables = vec![table::unknown(&unknown), table::lost(&lost)];
+            tables.extend(unknown.iter().map(table::reliability));
+            let text = tables.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n");
+            (text, serde_json::json!({"unknown": unknown, "lost": lost}))
+        }
+    };
+    if args.format == Format::Json {
+        text = format!("{}\n", serde_json::to_string_pretty(&json)?);
+    }
+    print(&text)
 }

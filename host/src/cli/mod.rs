@@ -19,6 +19,7 @@ pub mod parameters;
 pub mod replay;
 pub mod report;
 pub mod simulate;
+mod suite;
 pub mod table;
 
 pub use error::Error;

@@ -4,6 +4,7 @@
 //! needed to judge the tracker on other data, see `docs/manifest.md`.
 
 pub mod alignment;
+pub mod building;
 pub mod endurance;
 pub mod group;
 pub mod loading;

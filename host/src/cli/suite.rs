@@ -1,0 +1,137 @@
+//! The figures of the suites as tables.
+
+use super::table::Table;
+use crate::evaluation::building::suite::{Errors, KnownRow, LostRow, OtherRow, UnknownRow};
+
+fn metres(errors: &Errors) -> String {
+    format!("{:.3} / {:.3}", errors.mean_m, errors.worst_m)
+}
+
+/// Tables 7.2 and 7.3.
+pub fn known(rows: &[KnownRow]) -> Table {
+    let headings = ["stances", "way m", "steps alone m", "documented m", "default m", "default, corrected m"];
+    let mut table = Table::new("known start: mean / worst", &headings);
+    for row in rows {
+        let [documented, default] = &row.live;
+        table.row(
+            row.walk.clone(),
+            vec![
+                row.stances.to_string(),
+                format!("{:.1}", row.length_m),
+                metres(&row.steps_alone),
+                metres(documented),
+                metres(default),
+                metres(&row.corrected),
+            ],
+        );
+    }
+    let mean = |pick: &dyn Fn(&KnownRow) -> Errors| {
+        let count = rows.len().max(1) as f64;
+        let mean_m = rows.iter().map(|row| pick(row).mean_m).sum::<f64>() / count;
+        metres(&Errors {
+            mean_m,
+            worst_m: rows.iter().map(|row| pick(row).worst_m).fold(0.0, f64::max),
+            ..Errors::default()
+        })
+    };
+    table.row(
+        "all",
+        vec![
+            String::new(),
+            String::new(),
+            mean(&|row| row.steps_alone),
+            mean(&|row| row.live[0]),
+            mean(&|row| row.live[1]),
+            mean(&|row| row.corrected),
+        ],
+    );
+    table
+}
+
+/// The document's other tests.
+pub fn others(rows: &[OtherRow]) -> Table {
+    let headings =
+        ["settings", "floor right %", "live m", "end m", "located s", "places", "particles after 0, 1, 2, 5, 10"];
+    let mut table = Table::new("test: mean / worst", &headings);
+    for row in rows {
+        let particles: Vec<_> = row.particles.iter().map(usize::to_string).collect();
+        table.row(
+            row.test,
+            vec![
+                row.settings.to_owned(),
+                format!("{:.1}", row.floor_right_percent),
+                metres(&row.live),
+                metres(&row.end),
+                row.located_s.map_or_else(|| "-".to_owned(), |seconds| format!("{seconds:.0}")),
+                row.clusters.to_string(),
+                particles.join(" "),
+            ],
+        );
+    }
+    table
+}
+
+/// Unknown start.
+pub fn unknown(rows: &[UnknownRow]) -> Table {
+    let headings = [
+        "walks",
+        "located in 60 s %",
+        "at all %",
+        "wrongly %",
+        "mean m",
+        "75 % m",
+        "95 % m",
+        "worst m",
+        "floor right %",
+    ];
+    let mut table = Table::new("unknown start, three floors", &headings);
+    for row in rows {
+        table.row(
+            row.settings,
+            vec![
+                row.walks.to_string(),
+                format!("{:.1}", row.located_60_s_percent),
+                format!("{:.1}", row.located_percent),
+                format!("{:.1}", row.wrongly_percent),
+                format!("{:.3}", row.located.mean_m),
+                format!("{:.3}", row.located.p75_m),
+                format!("{:.3}", row.located.p95_m),
+                format!("{:.2}", row.located.worst_m),
+                format!("{:.2}", row.floor_right_percent),
+            ],
+        );
+    }
+    table
+}
+
+/// How often a probability was right.
+pub fn reliability(row: &UnknownRow) -> Table {
+    let corner = format!("likeliest room, {}", row.settings);
+    let mut table = Table::new(corner, &["moments", "said %", "right %"]);
+    for bin in &row.reliability {
+        table.row(
+            format!("{:.0} to {:.0} %", bin.from_percent, bin.to_percent),
+            vec![bin.moments.to_string(), format!("{:.1}", bin.said_percent), format!("{:.1}", bin.right_percent)],
+        );
+    }
+    table
+}
+
+/// Disturbed walks.
+pub fn lost(rows: &[LostRow]) -> Table {
+    let headings = ["settings", "walks", "back in 30 s %", "in 60 s %", "wrongly located after 60 s %"];
+    let mut table = Table::new("disturbance", &headings);
+    for row in rows {
+        table.row(
+            row.disturbance,
+            vec![
+                row.settings.to_owned(),
+                row.walks.to_string(),
+                format!("{:.1}", row.back_30_s_percent),
+                format!("{:.1}", row.back_60_s_percent),
+                format!("{:.1}", row.wrongly_percent),
+            ],
+        );
+    }
+    table
+}
