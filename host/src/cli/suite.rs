@@ -9,7 +9,7 @@ fn metres(errors: &Errors) -> String {
 
 /// Tables 7.2 and 7.3.
 pub fn known(rows: &[KnownRow]) -> Table {
-    let headings = ["stances", "way m", "steps alone m", "documented m", "default m", "default, corrected m"];
+    let headings = ["stances", "way m", "steps alone m", "documented m", "default m", "while located m", "corrected m"];
     let mut table = Table::new("known start: mean / worst", &headings);
     for row in rows {
         let [documented, default] = &row.live;
@@ -21,6 +21,7 @@ pub fn known(rows: &[KnownRow]) -> Table {
                 metres(&row.steps_alone),
                 metres(documented),
                 metres(default),
+                metres(&row.located),
                 metres(&row.corrected),
             ],
         );
@@ -42,6 +43,7 @@ pub fn known(rows: &[KnownRow]) -> Table {
             mean(&|row| row.steps_alone),
             mean(&|row| row.live[0]),
             mean(&|row| row.live[1]),
+            mean(&|row| row.located),
             mean(&|row| row.corrected),
         ],
     );

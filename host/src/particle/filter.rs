@@ -19,6 +19,9 @@ use std::sync::Arc;
 const BIN_M: f32 = 0.5;
 /// Headings of a bin.
 const BIN_HEADINGS: usize = 16;
+/// Who does not know where a walk leads does not know where it is, though it is one place still: 0.95 are 18 degrees
+/// (standard deviation).
+const KNOWN_HEADING: f64 = 0.95;
 /// Shares of the weight below this are not told.
 const LEAST_SHARE: f64 = 1e-3;
 /// Most places and rooms that are told.
@@ -325,7 +328,9 @@ impl ParticleFilter {
             self.clusters.find(&self.particles, total, &self.map)
         };
         let clear = clusters.first().is_some_and(|first| {
-            first.probability >= f64::from(p.located_share) && first.sigma_m() <= f64::from(p.located_sigma_m)
+            first.probability >= f64::from(p.located_share)
+                && first.sigma_m() <= f64::from(p.located_sigma_m)
+                && first.heading_agreement >= KNOWN_HEADING
         });
         self.clear_steps = if clear { self.clear_steps.saturating_add(1) } else { 0 };
         let state = self.state(&clusters);
@@ -361,7 +366,7 @@ impl ParticleFilter {
             return State::Located;
         }
         // Who was located stays so while most of the weight is still in one place of a few metres.
-        let wide = 4.0 * f64::from(p.located_sigma_m);
+        let wide = 2.0 * f64::from(p.located_sigma_m);
         if self.estimate.state == State::Located && first.probability > 0.9 * sure && first.sigma_m() < wide {
             return State::Located;
         }

@@ -85,19 +85,28 @@ pub fn follow(
     Ok(Followed { said, corrected_m })
 }
 
-/// The same by the steps alone, with start and heading given (Foot, 7.3): distances to the truth in the plane. **Units:** m.
+/// Way that shows the heading of the start. **Units:** m.
+const FIRST_LEG_M: f64 = 4.0;
+
+/// The same by the steps alone, with start and heading given (Foot, 7.3): distances to the truth in the plane. The heading is
+/// that of the first few metres, since how the sensor sits on the foot is not known. **Units:** m.
 pub fn dead_reckoned(walk: &Walk) -> Vec<f64> {
     let Some(&start) = walk.truth.first() else { return Vec::new() };
-    let (mut place, mut heading) = (start, walk.heading);
-    let mut errors = vec![0.0];
-    for (step, truth) in walk.steps.iter().zip(&walk.truth).skip(1) {
+    let mut places = vec![Vector3::zeros()];
+    let (mut place, mut heading) = (Vector3::zeros(), 0.0_f64);
+    for step in walk.steps.iter().skip(1) {
         let (sin, cos) = heading.sin_cos();
         let moved = step.displacement.map(f64::from);
         place += Vector3::new(cos * moved.x - sin * moved.y, sin * moved.x + cos * moved.y, moved.z);
         heading += f64::from(step.turn);
-        errors.push((place - truth).xy().norm());
+        places.push(place);
     }
-    errors
+    let far = places.iter().position(|place| place.xy().norm() > FIRST_LEG_M).unwrap_or_default();
+    let direction = |to: Vector3<f64>| to.y.atan2(to.x);
+    let (sin, cos) = (direction(walk.truth[far] - start) - direction(places[far])).sin_cos();
+    let turned =
+        |place: &Vector3<f64>| Vector3::new(cos * place.x - sin * place.y, sin * place.x + cos * place.y, place.z);
+    places.iter().zip(&walk.truth).map(|(place, truth)| (start + turned(place) - truth).xy().norm()).collect()
 }
 
 impl Followed {

@@ -69,6 +69,8 @@ pub struct KnownRow {
     pub steps_alone: Errors,
     /// Documented, default: as it was said at the time (table 7.2).
     pub live: [Errors; 2],
+    /// Default: as it was said while it was located.
+    pub located: Errors,
     /// Default: as it was known at the end.
     pub corrected: Errors,
 }
@@ -116,6 +118,7 @@ pub fn known(default: &Parameters, seed: u64) -> Result<Vec<KnownRow>, Error> {
             length_m: walk.length(),
             steps_alone: Errors::of(dead_reckoned(&walk)),
             live: [errors(&documented), errors(&default)],
+            located: Errors::of(default.located_errors()),
             corrected: Errors::of(default.corrected_m),
         })
     };

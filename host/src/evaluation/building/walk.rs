@@ -14,8 +14,6 @@ pub struct Walk {
     pub steps: Vec<Step>,
     /// Where the sensor was at the end of each. **Units:** m; **Frame:** building.
     pub truth: Vec<Vector3<f64>>,
-    /// Direction of the foot at the start. **Units:** rad; **Frame:** building.
-    pub heading: f64,
 }
 
 /// Who walks, and with which chance.
@@ -50,7 +48,7 @@ impl Walk {
             Scenario { seed: walker.seed, person: walker.person, sensor, route: route.clone(), ..Scenario::default() };
         let simulation = Simulation::new(&scenario).map_err(|error| Error::Model(error.to_string()))?;
         let mut tracker = Tracker::new(&Parameters::default());
-        let mut walk = Self { steps: Vec::new(), truth: Vec::new(), heading: route.heading };
+        let mut walk = Self { steps: Vec::new(), truth: Vec::new() };
         // Steps are told some samples after their stance has ended.
         let mut poses: Vec<(Micros, [f64; 3])> = Vec::new();
         for moment in simulation {
