@@ -203,36 +203,43 @@ pub fn twin(floors: i32) -> Building {
     made(building)
 }
 
-/// Six floors of 10 000 m² each with some sixteen hundred rooms: corridors along x with rooms of random widths on both sides,
-/// joined by one across, four staircases and two elevators.
+/// Six floors of 10 000 m² each with some sixteen hundred rooms.
 pub fn large(seed: u64) -> Building {
-    const FLOORS: i32 = 6;
-    const STRIPS: usize = 5;
+    offices("Large", 6, 5, 125.0, seed)
+}
+
+/// Floors with `strips` corridors along x, `long` metres of them, with rooms of random widths on both sides; joined by one
+/// corridor across, with a staircase on both sides of it at both ends and an elevator.
+///
+/// # Panics
+/// Never for one floor to a hundred, one strip or more, and a length of 30 m or more.
+pub fn offices(name: &str, floors_wanted: i32, strips: usize, long: f64, seed: u64) -> Building {
     const STRIP: f64 = 16.0;
     const ROOM: f64 = 6.7;
-    const LONG: f64 = 125.0;
-    const ACROSS: [f64; 2] = [60.0, 65.0];
+    let across = [(0.48 * long).round(), (0.48 * long).round() + 5.0];
     let mut random = Pcg64Mcg::new(u128::from(seed) << 1 | 1);
     let mut unit = move || (random.next_u32() >> 8) as f64 / f64::from(1 << 24);
-    let cabins = [0.0, 4.0 * STRIP].map(|y| ([ACROSS[0], y + 0.5], [ACROSS[0] + 2.0, y + 2.7]));
+    let last = STRIP * (strips - 1) as f64;
+    let ends: Vec<f64> = if strips > 1 { vec![0.0, last] } else { vec![0.0] };
+    let cabins: Vec<_> = ends.iter().map(|y| ([across[0], y + 0.5], [across[0] + 2.0, y + 2.7])).collect();
     let mut floors = Vec::new();
-    for number in 0..FLOORS {
+    for number in 0..floors_wanted {
         let mut drawing = Drawing::new(number);
-        for strip in 0..STRIPS {
+        for strip in 0..strips {
             let south = STRIP * strip as f64;
             let (low, high) = (south + ROOM, south + STRIP - ROOM);
-            let with_stairs = strip == 0 || strip == STRIPS - 1;
-            for (side, from, to) in [("W", 0.0, ACROSS[0]), ("E", ACROSS[1], LONG)] {
+            let with_stairs = strip == 0 || strip == strips - 1;
+            for (side, from, to) in [("W", 0.0, across[0]), ("E", across[1], long)] {
                 // South of the corridor rooms only; north of it a staircase beside the way across in the outer strips.
                 for (row, corridor, outer) in [("S", low, south), ("N", high, south + STRIP)] {
                     let (mut west, mut east) = (from, to);
                     if row == "N" && with_stairs {
                         if side == "W" {
                             east -= STAIRS_M[0];
-                            drawing.staircase(east, high, number == 0, number == FLOORS - 1);
+                            drawing.staircase(east, high, number == 0, number == floors_wanted - 1);
                             drawing.wall([east, high + STAIRS_M[1]], [east, outer]);
                         } else {
-                            drawing.staircase(west, high, number == 0, number == FLOORS - 1);
+                            drawing.staircase(west, high, number == 0, number == floors_wanted - 1);
                             west += STAIRS_M[0];
                             drawing.wall([west, high + STAIRS_M[1]], [west, outer]);
                         }
@@ -246,37 +253,37 @@ pub fn large(seed: u64) -> Building {
                 let end = if side == "W" { from } else { to };
                 drawing.wall([end, low], [end, high]);
             }
-            // Between the strips the way across has its own walls where no room ends.
         }
-        let top = STRIP * STRIPS as f64;
-        drawing.room(format!("across-{number}"), "corridor", [ACROSS[0], 0.0], [ACROSS[1], top]);
-        drawing.wall([ACROSS[0], top], [ACROSS[1], top]);
-        for y in [0.0, 4.0 * STRIP].map(|south| south + STRIP - ROOM + STAIRS_M[1]) {
-            for x in ACROSS {
+        let top = STRIP * strips as f64;
+        drawing.room(format!("across-{number}"), "corridor", [across[0], 0.0], [across[1], top]);
+        drawing.wall([across[0], top], [across[1], top]);
+        for y in ends.iter().map(|south| south + STRIP - ROOM + STAIRS_M[1]) {
+            for x in across {
                 drawing.wall([x, y], [x, y + ROOM - STAIRS_M[1]]);
             }
         }
         if number == 0 {
-            drawing.wall_with_gaps([ACROSS[0], 0.0], [ACROSS[1], 0.0], &[(ACROSS[0] + 3.5, 1.8)], true);
+            drawing.wall_with_gaps([across[0], 0.0], [across[1], 0.0], &[(across[0] + 3.5, 1.8)], true);
         } else {
-            drawing.wall([ACROSS[0], 0.0], [ACROSS[1], 0.0]);
+            drawing.wall([across[0], 0.0], [across[1], 0.0]);
         }
-        for (low, high) in cabins {
+        for &(low, high) in &cabins {
             drawing.elevator(low, high);
         }
         floors.push(drawing.floor);
     }
     let north = STRIP - ROOM;
     let mut connectors = Vec::new();
-    for (strip, south) in [(1, 0.0), (STRIPS, 4.0 * STRIP)] {
-        connectors.push(stairs(&format!("stairs-{strip}W"), ACROSS[0] - STAIRS_M[0], south + north, FLOORS));
-        connectors.push(stairs(&format!("stairs-{strip}E"), ACROSS[1], south + north, FLOORS));
+    for &south in &ends {
+        let strip = (south / STRIP).round() as usize + 1;
+        connectors.push(stairs(&format!("stairs-{strip}W"), across[0] - STAIRS_M[0], south + north, floors_wanted));
+        connectors.push(stairs(&format!("stairs-{strip}E"), across[1], south + north, floors_wanted));
     }
     for (index, (low, high)) in cabins.into_iter().enumerate() {
-        connectors.push(elevator(&format!("elevator-{}", index + 1), low, high, FLOORS));
+        connectors.push(elevator(&format!("elevator-{}", index + 1), low, high, floors_wanted));
     }
-    let entrances = vec![Entrance { name: "main".to_owned(), floor: 0, place: [ACROSS[0] + 3.5, 0.3] }];
-    made(Building { name: "Large".to_owned(), floors, connectors, entrances, ..Building::default() })
+    let entrances = vec![Entrance { name: "main".to_owned(), floor: 0, place: [across[0] + 3.5, 0.3] }];
+    made(Building { name: name.to_owned(), floors, connectors, entrances, ..Building::default() })
 }
 
 /// Widths of rooms from 3 m to 9 m that fill `length`.

@@ -4,7 +4,7 @@ use super::suite as table;
 use super::{Error, parameters, print, progress};
 use crate::evaluation::building::suite;
 use crate::evaluation::{Manifest, Perturbation, Report, Settings, evaluate};
-use crate::particle;
+use crate::{particle, toml_file};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 
@@ -20,6 +20,9 @@ pub struct Args {
     /// Simulated walks in generated buildings in place of recordings
     #[arg(long, value_enum, conflicts_with_all = ["manifest", "parameters", "only", "perturb"])]
     suite: Option<Suite>,
+    /// Settings of the particle filter in place of the default
+    #[arg(long, value_name = "FILE.toml", requires = "suite")]
+    particle: Option<PathBuf>,
     /// Walks from an unknown start in the suite 'building'
     #[arg(long, value_name = "N", default_value_t = 200, requires = "suite")]
     walks: usize,
@@ -110,8 +113,15 @@ fn in_pool<T: Send>(threads: Option<std::num::NonZeroUsize>, work: impl FnOnce()
     Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(work))
 }
 
+/// Rooms of a walk from an unknown start, and of a walk of which a part is missing.
+const SHORT_STOPS: usize = 4;
+const LONG_STOPS: usize = 9;
+
 fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
-    let default = particle::Parameters::default();
+    let default = match &args.particle {
+        Some(path) => toml_file::read("settings of the particle filter", path)?,
+        None => particle::Parameters::default(),
+    };
     let (mut text, json) = match which {
         Suite::FootDocument => {
             let (known, others) = (suite::known(&default, args.seed)?, suite::others(&default, args.seed)?);
@@ -120,13 +130,14 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
         }
         Suite::Building => {
             let documented = particle::Parameters::documented();
-            let bar = progress(6 * args.walks as u64, "walks", false);
+            let bar = progress(8 * args.walks as u64, "walks", false);
             let done = || bar.inc(1);
-            let walks = suite::random_walks(args.walks, args.seed, done)?;
+            let walks = suite::random_walks(args.walks, SHORT_STOPS, args.seed, done)?;
+            let long = suite::random_walks(args.walks, LONG_STOPS, args.seed, done)?;
             let (mut unknown, mut lost) = (Vec::new(), Vec::new());
             for (name, parameters) in [("documented", &documented), ("default", &default)] {
                 unknown.push(suite::unknown(name, parameters, &walks, done)?);
-                lost.extend(suite::lost(name, parameters, &walks, done)?);
+                lost.extend(suite::lost(name, parameters, &long, done)?);
             }
             bar.finish_and_clear();
             let mut tables = vec![table::unknown(&unknown), table::lost(&lost)];

@@ -91,6 +91,13 @@ fn twin(floors: i32) -> Result<(Building, Arc<Map>), Error> {
     Ok((building, map))
 }
 
+/// Three floors of offices, 1 920 m² each, no two rooms alike.
+fn offices() -> Result<(Building, Arc<Map>), Error> {
+    let building = generate::offices("Offices", 3, 2, 60.0, 1);
+    let map = Arc::new(Map::of(&building)?);
+    Ok((building, map))
+}
+
 /// Tables 7.2 and 7.3: three people, forwards and backwards, start known, heading unknown.
 ///
 /// # Errors
@@ -238,12 +245,12 @@ pub struct Reliability {
 }
 
 /// Random ways on three floors: from room to room, over stairs and with elevators.
-fn random_stops(building: &Building, seed: u64) -> Vec<String> {
+fn random_stops(building: &Building, rooms: usize, seed: u64) -> Vec<String> {
     let mut random = Pcg64Mcg::new(u128::from(seed) << 1 | 1);
     let mut pick = move |count: usize| (random.next_u32() as usize) % count.max(1);
     let mut stops: Vec<String> = Vec::new();
     let mut floor = pick(building.floors.len());
-    for _ in 0..4 {
+    for _ in 0..rooms {
         if !stops.is_empty() {
             // Half of the ways change the floor.
             let next = if pick(2) == 0 { floor } else { pick(building.floors.len()) };
@@ -252,22 +259,22 @@ fn random_stops(building: &Building, seed: u64) -> Vec<String> {
                 floor = next;
             }
         }
-        let rooms = &building.floors[floor].rooms;
-        stops.push(rooms[pick(rooms.len())].name.clone());
+        let here = &building.floors[floor].rooms;
+        stops.push(here[pick(here.len())].name.clone());
     }
     stops
 }
 
-/// Random walks, made once.
+/// Random walks through so many rooms of three floors.
 ///
 /// # Errors
 /// When a walk cannot be made.
-pub fn random_walks(count: usize, seed: u64, done: impl Fn() + Sync) -> Result<Vec<Walk>, Error> {
-    let (building, _) = twin(3)?;
+pub fn random_walks(count: usize, rooms: usize, seed: u64, done: impl Fn() + Sync) -> Result<Vec<Walk>, Error> {
+    let (building, _) = offices()?;
     let people = Person::all();
     let walk = |index: usize| {
         let seed = seed.wrapping_mul(10_000).wrapping_add(index as u64);
-        let stops = random_stops(&building, seed);
+        let stops = random_stops(&building, rooms, seed);
         let stops: Vec<&str> = stops.iter().map(String::as_str).collect();
         let walk = Walk::through(&building, &stops, &Walker { person: people[index % people.len()], seed })?;
         done();
@@ -286,7 +293,7 @@ pub fn unknown(
     walks: &[Walk],
     done: impl Fn() + Sync,
 ) -> Result<UnknownRow, Error> {
-    let (_, map) = twin(3)?;
+    let (_, map) = offices()?;
     let one = |(index, walk): (usize, &Walk)| {
         let followed = follow(&map, parameters, &Start::Anywhere, (&walk.steps, &walk.truth), index as u64)?;
         done();
@@ -363,7 +370,7 @@ pub fn lost(
     walks: &[Walk],
     done: impl Fn() + Sync,
 ) -> Result<Vec<LostRow>, Error> {
-    let (_, map) = twin(3)?;
+    let (_, map) = offices()?;
     let disturbances: [(&'static str, Disturb); 2] = [("10 m unnoticed", teleported), ("2 min missing", holed)];
     let mut rows = Vec::new();
     for (disturbance, disturb) in disturbances {
