@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Builds the firmware for the emulator.
 pub fn build() -> Result<(), Failure> {
-    process::run(&mut device::Route::find()?.build(&in_root("firmware/emulator")))
+    process::run(device::Route::find()?.build(&in_root("firmware/emulator")).args(["--bin", "sohle-shoe"]))
 }
 
 /// A simulated walk as a recording.
