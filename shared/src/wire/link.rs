@@ -248,6 +248,14 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
         Some(request)
     }
 
+    /// The request that was handed out last, as long as it is not answered.
+    pub fn running(&self) -> Option<&Request> {
+        match &self.peer.as_ref()?.command {
+            CommandState::Running(_, request) => Some(request),
+            _ => None,
+        }
+    }
+
     /// Answers the request that was handed out last.
     pub fn answer(&mut self, result: Result<(), Refusal>) {
         let Some(peer) = &mut self.peer else { return };

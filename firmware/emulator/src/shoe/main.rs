@@ -22,6 +22,7 @@ use interrupt::Irq;
 use panic_semihosting as _;
 use sensor::{Bus, Pin, Walk};
 use sohle_shared::bmx055::blocking::Blocking;
+use sohle_shared::bmx055::counts::Header;
 use sohle_shared::bmx055::twin::{Chip, SimulatedBmx055, SimulatedDelay};
 use sohle_shared::bmx055::{Bmx055, Config, Die};
 use sohle_shared::calibration::Calibration;
@@ -154,9 +155,20 @@ unsafe fn DefaultHandler(number: i16) {
     }
 }
 
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    let stack = stack::paint(Some((&raw const _stack_start).addr() as u32));
+/// Starts clock and tasks. Not inlined: what it takes of the stack is free again when the tasks run.
+#[inline(never)]
+fn set_off(header: Header, shoe: &'static mut Wearer, stack: Painted) {
+    clock::start();
+    interrupt::prioritise(Irq::SENSE, SENSE_PRIORITY);
+    interrupt::prioritise(Irq::PROCESS, PROCESS_PRIORITY);
+    let sensing = start_sensing(header.accel_period_ns, header.gyro_period_ns).expect("started once");
+    SENSE.start(Irq::SENSE).spawn(sensing);
+    PROCESS.start(Irq::PROCESS).spawn(start_processing(shoe, stack).expect("started once"));
+}
+
+/// Opens the walk. No board has one, so this comes before the stack is watched.
+#[inline(never)]
+fn open_walk() -> Header {
     let Some(walk) = Walk::open() else {
         heprintln!("error: no walk; expected the name of a file that 'sohle convert' wrote");
         debug::exit(debug::EXIT_FAILURE);
@@ -164,16 +176,17 @@ fn main() -> ! {
     };
     let header = *walk.header();
     critical_section::with(|cs| WALK.borrow_ref_mut(cs).replace(walk));
-    clock::start();
-    interrupt::prioritise(Irq::SENSE, SENSE_PRIORITY);
-    interrupt::prioritise(Irq::PROCESS, PROCESS_PRIORITY);
-    let sensing = start_sensing(header.accel_period_ns, header.gyro_period_ns).expect("started once");
-    SENSE.start(Irq::SENSE).spawn(sensing);
+    header
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
     let mut shoe = make();
     let shoe = &raw mut shoe;
     // SAFETY: this function never returns, so its frame and the shoe in it stay for ever, and this is the only reference.
     let shoe: &'static mut Wearer = unsafe { &mut *shoe };
-    PROCESS.start(Irq::PROCESS).spawn(start_processing(shoe, stack).expect("started once"));
+    let header = open_walk();
+    set_off(header, shoe, stack::paint(Some((&raw const _stack_start).addr() as u32)));
     loop {
         // Masked, an interrupt still ends the sleep, but is served after the time was taken.
         cortex_m::interrupt::disable();
