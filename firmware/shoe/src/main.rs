@@ -29,7 +29,7 @@ const RING: usize = 1_024;
 
 static TRAFFIC: Traffic = Traffic::new();
 
-/// 21 kB that are never on the stack.
+/// 23 kB that are never on the stack.
 static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::blank());
 
 /// The shoe with its steps elsewhere.
