@@ -1,5 +1,4 @@
 //! A thousand steps fit into the shoe's outbox, whoever walks and however.
-#![expect(clippy::unwrap_used, reason = "the helpers of a test are part of it")]
 
 use sohle::evaluation::loading::{self, LoadError};
 use sohle::evaluation::manifest::Manifest;

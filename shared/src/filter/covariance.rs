@@ -86,7 +86,7 @@ pub fn square_root<const N: usize>(m: &SMatrix<f32, N, N>) -> Option<SMatrix<f32
 /// The square root of `m`, a symmetric matrix, repaired first if it has none. The second part tells whether it was.
 ///
 /// Rounding alone makes a matrix with known directions negative by some 1e-6 of its variances. Correlations are shrunk by
-/// that little ([`ROUNDINGS`]) without calling it a repair.
+/// that little without calling it a repair.
 pub fn repaired_square_root<const N: usize>(m: &mut SMatrix<f32, N, N>) -> (SMatrix<f32, N, N>, bool) {
     if let Some(diagonal) = shrink(m, &ROUNDINGS) {
         let root = root_of(m, &diagonal);

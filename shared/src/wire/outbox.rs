@@ -6,7 +6,7 @@
 //! a bounded pace. When there is no room, the oldest step gives way and is counted; the laptop learns it from the number of
 //! the oldest step kept.
 //!
-//! What waits is [kept as differences](super::shelf), in half the bytes that are sent of it.
+//! What waits is kept as the difference of each step to the one before, in half the bytes that are sent of it.
 //!
 //! # Source
 //! The waiting time is that of RFC 6298 (sections 2 and 3: smoothed round-trip time, none from a step sent twice).
