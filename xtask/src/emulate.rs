@@ -2,6 +2,7 @@
 
 mod proxy;
 
+use crate::firmware::{self, Budget};
 use crate::process::{self, Failure};
 use crate::{device, in_root, tools};
 use proxy::Proxy;
@@ -77,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Builds the firmware for the emulator.
 pub fn build() -> Result<(), Failure> {
-    process::run(&mut device::Route::find()?.build(&in_root("firmware/emulator")))
+    process::run(device::Route::find()?.build(&in_root("firmware/emulator")).args(["--bin", "sohle-shoe"]))
 }
 
 /// A simulated walk as a recording.
@@ -162,6 +163,8 @@ pub fn check() -> Result<(), Failure> {
     build()?;
     let folder = in_root("target/emulate");
     std::fs::create_dir_all(&folder).map_err(|source| file(&folder, source))?;
+    let statics = firmware::statics_without(&device::binary("sohle-shoe"), &["TWIN", "WALK"])?;
+    let mut stack = 0;
     let mut walks = Vec::new();
     for (name, profile, seconds) in RECORDINGS {
         let here = ["recordings", "../shared/recordings"].map(|folder| in_root(folder).join(name));
@@ -185,6 +188,7 @@ pub fn check() -> Result<(), Failure> {
         let summary = live_walk(&sohle, port, *seconds, Some(&live), None)?;
         drop(running);
         row(name, &summary);
+        stack = stack.max(summary.stack.unwrap_or_default());
         if summary.frames_bad > 0 || summary.steps == 0 {
             return Err(Failure::Found(format!("{name}: {} steps, {} bad frames", summary.steps, summary.frames_bad)));
         }
@@ -194,17 +198,27 @@ pub fn check() -> Result<(), Failure> {
         println!("  {}", told.ok_or_else(|| Failure::Found(format!("{name}: nothing was computed again")))?);
     }
     let (_, walk, profile, seconds) = &walks[0];
-    over_a_bad_line(&sohle, &converted(&sohle, &folder, walk, *profile)?, *seconds)?;
+    let bad = over_a_bad_line(&sohle, &converted(&sohle, &folder, walk, *profile)?, *seconds)?;
     let walk = folder.join("short.mcap");
     let mut command = Command::new(&sohle);
     command.args(["simulate", "--gait", "walk", "--strides", "10", "--out"]).arg(&walk);
     process::read(&mut command)?;
-    asleep(&sohle, &folder, &converted(&sohle, &folder, &walk, None)?)
+    let slept = asleep(&sohle, &folder, &converted(&sohle, &folder, &walk, None)?)?;
+    within_budget(statics, stack.max(bad).max(slept))
+}
+
+/// All that the shoe needs of the RAM, against its budget. What the twin and the walk keep is left out, since no board has
+/// either; the stack below the twin's driver is not. It holds the shoe itself, as on the boards.
+fn within_budget(statics: u64, stack: u32) -> Result<(), Failure> {
+    let (ram, budget) = (statics + u64::from(stack), Budget::read()?.ram);
+    let told = format!("{statics} bytes of statics and {stack} of stack are {ram} of RAM, of {budget}");
+    println!("  {told}");
+    if stack > 0 && ram <= budget { Ok(()) } else { Err(Failure::Found(told)) }
 }
 
 /// A short walk with a sensor that sleeps soon: the shoe must sleep before and after it, and miss no step. What
-/// the processor does then goes to the twin's readings for the most part, which no real board has to make.
-fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<(), Failure> {
+/// the processor does then goes to the twin's readings for the most part, which no real board has to make. Depth of the stack.
+fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<u32, Failure> {
     let parameters = |seconds: u32| {
         let path = folder.join("parameters.toml");
         let text = format!("sleep_after_s = {seconds}.0\n");
@@ -230,11 +244,11 @@ fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<(), Failure> {
         let (steps, all) = (slept.steps, awake.steps);
         return Err(Failure::Found(format!("it slept {sleeps} times, and of {all} steps {steps} came")));
     }
-    Ok(())
+    Ok(slept.stack.max(awake.stack).unwrap_or_default())
 }
 
-/// The first walk over a line that damages bytes and loses pieces, both ways: every step must arrive, once.
-fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<(), Failure> {
+/// The first walk over a line that damages bytes and loses pieces, both ways: every step must arrive, once. Depth of the stack.
+fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<u32, Failure> {
     let (shoe, laptop) = (free_port()?, free_port()?);
     let running = Running::start(shoe, counts)?;
     let proxy =
@@ -252,7 +266,7 @@ fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<(), Fail
             summary.steps, summary.lost, summary.doubled
         )));
     }
-    Ok(())
+    Ok(summary.stack.unwrap_or_default())
 }
 
 fn row(name: &str, summary: &Summary) {

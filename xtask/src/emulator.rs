@@ -15,7 +15,8 @@ const LIMIT: Duration = Duration::from_secs(600);
 pub fn run() -> Result<(), Failure> {
     tools::QEMU.required()?;
     let route = device::Route::find()?;
-    process::run(&mut route.build(&in_root("firmware/emulator")))?;
+    let mut build = route.build(&in_root("firmware/emulator"));
+    process::run(build.args(["--bin", "sohle-emulator", "--features", "documented"]))?;
     let emulated = emulate()?.out;
     let native = process::read(&mut Command::new(process::build("dev", "--example", "selftest")?))?.out;
 

@@ -22,7 +22,7 @@ fn print(cost: &Cost, name: &str, rate: u32, phase: &str) {
 fn measure(name: &str, period_us: u32, parameters: &Parameters) {
     let rate = 1_000_000 / period_us;
     let (mut swinging, mut standing) = (Cost::default(), Cost::default());
-    let stack = stack::paint();
+    let stack = stack::paint(None);
     let report = selftest::track(period_us, parameters, |tracker, sample| {
         let before = meter::mark();
         let output = tracker.push(sample);

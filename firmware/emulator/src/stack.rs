@@ -14,28 +14,31 @@ const MARGIN: u32 = 256;
 /// A stack that was painted.
 #[derive(Clone, Copy)]
 pub struct Painted {
-    /// Where it was painted from. Address.
+    /// Below this it was painted. Address.
+    live: u32,
+    /// From here its depth counts. Address.
     top: u32,
 }
 
 impl Painted {
-    /// Words from `DEPTH` below the top up to just below it.
+    /// Words from `DEPTH` below the frame that painted up to just below it.
     fn words(self) -> impl Iterator<Item = *mut u32> {
-        (self.top - DEPTH..self.top - MARGIN).step_by(4).map(|address| address as *mut u32)
+        (self.live - DEPTH..self.live - MARGIN).step_by(4).map(|address| address as *mut u32)
     }
 
-    /// How deep the stack has been below the place where it was painted. **Units:** bytes.
+    /// How deep the stack has been below its top. **Units:** bytes.
     pub fn used(self) -> u32 {
         // SAFETY: as in `paint`; reading what was painted there.
         let intact = self.words().take_while(|&word| unsafe { ptr::read_volatile(word) } == PAINT).count() as u32;
-        DEPTH - 4 * intact
+        DEPTH - 4 * intact + (self.top - self.live)
     }
 }
 
-/// Paints the memory below the stack.
+/// Paints the memory below the stack. Its depth counts from `top`, or from here.
 #[inline(never)]
-pub fn paint() -> Painted {
-    let painted = Painted { top: msp::read() & !3 };
+pub fn paint(top: Option<u32>) -> Painted {
+    let live = msp::read() & !3;
+    let painted = Painted { live, top: top.unwrap_or(live) };
     for word in painted.words() {
         // SAFETY: the memory map leaves 4 MB between the statics and the start of the stack, which nothing else uses;
         // `MARGIN` keeps clear of the live frame, and no interrupt is enabled that would push another.

@@ -6,19 +6,18 @@ use cortex_m_rt::entry;
 use embassy_executor::Spawner;
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::IWDG;
-use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
+use embassy_stm32::usart::{RingBufferedUartRx, UartRx, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use sohle_shared::bmx055::Config;
-use sohle_shared::calibration::Calibration;
 use sohle_shared::shoe::Shoe;
-use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Level, Refusal, ResetReason};
 use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::transfer::Value;
+use sohle_shoe::board::{self, Sensor};
 use sohle_shoe::executor::{self, Load};
 use sohle_shoe::settings::Settings;
-use sohle_shoe::{board, kept, sensor, stack};
+use sohle_shoe::{kept, sensor, stack};
 use sohle_tasks::{Board, BoardHealth, Traffic, now, process, send};
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -30,7 +29,7 @@ const RING: usize = 1_024;
 
 static TRAFFIC: Traffic = Traffic::new();
 
-/// 40 kB that are never on the stack.
+/// 23 kB that are never on the stack.
 static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::blank());
 
 /// The shoe with its steps elsewhere.
@@ -68,43 +67,62 @@ async fn sending(line: UartTx<'static, Async>) {
     send(&TRAFFIC, line).await
 }
 
-/// A shoe. Not inlined: like this the compiler makes it where the caller wants it, and not a second one beside it.
+/// What the tasks are made of.
+struct Parts {
+    sensor: Sensor,
+    tx: UartTx<'static, Async>,
+    rx: UartRx<'static, Async>,
+    machine: Machine,
+    boot: u32,
+}
+
+// None of these is inlined: what they take of the stack is free again when the tasks run.
+
+/// The board with its settings.
 #[inline(never)]
-fn make(identity: Identity, config: &Config, parameters: &Parameters, calibration: &Calibration) -> Wearer {
+fn begin() -> Parts {
+    let board::Board { sensor, tx, rx, flash, watchdog, reset, boot } = board::start();
+    let machine = Machine { settings: Settings::open(flash), watchdog, load: Load::start(), reset };
+    Parts { sensor, tx, rx, machine, boot }
+}
+
+/// A shoe. The compiler makes it where the caller wants it, and not a second one beside it.
+#[inline(never)]
+fn make(boot: u32, settings: &mut Settings) -> Wearer {
+    let identity = Identity { boot, firmware: env!("CARGO_PKG_VERSION"), board: board::NAME };
     let outbox = OUTBOX.take();
     outbox.begin(Pace::SERIAL);
-    Shoe::new(identity, config, parameters, calibration, outbox)
+    Shoe::new(identity, &Config::default(), &settings.parameters(), &settings.calibration(), outbox)
+}
+
+/// Starts the tasks.
+#[inline(never)]
+fn set_off(spawner: Spawner, parts: Parts, shoe: &'static mut Wearer) {
+    static BUFFER: StaticCell<[u8; RING]> = StaticCell::new();
+    let Parts { sensor, tx, rx, mut machine, .. } = parts;
+    if let Some(words) = kept::take() {
+        defmt::error!("before the reset: {=str}", words.as_str());
+        shoe.log(now(), Level::Error, &words);
+    }
+    if machine.settings.refused() {
+        shoe.log(now(), Level::Warn, "kept settings cannot be used: defaults are in effect");
+    }
+    let line = rx.into_ring_buffered(BUFFER.init([0; RING]));
+    machine.watchdog.unleash();
+    sensor::start(sensor, Config::default(), &TRAFFIC);
+    spawner.spawn(sending(tx).expect("one line"));
+    spawner.spawn(processing(shoe, line, machine).expect("one shoe"));
 }
 
 #[entry]
 fn main() -> ! {
-    static BUFFER: StaticCell<[u8; RING]> = StaticCell::new();
-    let words = kept::take();
-    let board = board::start();
     let core = cortex_m::Peripherals::take().expect("nobody took them before");
     defmt::info!("sohle {=str} on {=str}", env!("CARGO_PKG_VERSION"), board::NAME);
-
-    let mut settings = Settings::open(board.flash);
-    let (config, parameters, calibration) = (Config::default(), settings.parameters(), settings.calibration());
-    let identity = Identity { boot: board.boot, firmware: env!("CARGO_PKG_VERSION"), board: board::NAME };
-    let mut shoe = make(identity, &config, &parameters, &calibration);
-    if let Some(words) = words {
-        defmt::error!("before the reset: {=str}", words.as_str());
-        shoe.log(now(), Level::Error, &words);
-    }
-    if settings.refused() {
-        shoe.log(now(), Level::Warn, "kept settings cannot be used: defaults are in effect");
-    }
-    let line = board.rx.into_ring_buffered(BUFFER.init([0; RING]));
-    let mut machine = Machine { settings, watchdog: board.watchdog, load: Load::start(), reset: board.reset };
-    machine.watchdog.unleash();
-    sensor::start(board.sensor, config, &TRAFFIC);
+    let mut parts = begin();
+    let mut shoe = make(parts.boot, &mut parts.machine.settings);
     let shoe_at = &raw mut shoe;
     // SAFETY: the executor never returns, so this frame and the shoe in it stay for ever, and this is the only reference. In a
     // static it would have to be copied from a stack that is as large again.
     let shoe: &'static mut Wearer = unsafe { &mut *shoe_at };
-    executor::run(core.SCB, |spawner: Spawner| {
-        spawner.spawn(sending(board.tx).expect("one line"));
-        spawner.spawn(processing(shoe, line, machine).expect("one shoe"));
-    })
+    executor::run(core.SCB, |spawner| set_off(spawner, parts, shoe))
 }

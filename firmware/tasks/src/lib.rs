@@ -6,6 +6,7 @@
 #![no_std]
 
 mod process;
+mod queue;
 mod sense;
 mod traffic;
 

@@ -1,6 +1,7 @@
 //! Makes steps of what was read, and talks to the laptop.
 
-use crate::traffic::{Sensed, Traffic};
+use crate::queue::Sensed;
+use crate::traffic::Traffic;
 use crate::{instant, now};
 use core::borrow::BorrowMut;
 use embassy_futures::select::{Either4, select4};
@@ -57,7 +58,7 @@ pub async fn process<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>>(
     let (mut quiet_s, mut asked) = (0, None);
     loop {
         let due = transmit(traffic, shoe);
-        match select4(traffic.sensed.receive(), line.read(&mut bytes), Timer::at(instant(due)), seconds.next()).await {
+        match select4(traffic.sensed(), line.read(&mut bytes), Timer::at(instant(due)), seconds.next()).await {
             Either4::First(Sensed::Batch(batch)) => {
                 shoe.sensed(&batch);
                 lateness = lateness.max(now() - batch.stamp);
@@ -102,7 +103,8 @@ pub async fn process<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>>(
     }
 }
 
-/// Fills the line; when to ask again.
+/// Fills the line; when to ask again. Not inlined: its buffer is on the stack only while it is used.
+#[inline(never)]
 fn transmit<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>>(traffic: &Traffic, shoe: &mut Shoe<STEPS, O>) -> Micros {
     let mut buffer = [0; FRAME_MAX];
     loop {

@@ -1,6 +1,6 @@
 //! Reads the sensor.
 
-use crate::traffic::{Sensed, Traffic};
+use crate::traffic::Traffic;
 use crate::{instant, now};
 use core::future::pending;
 use embassy_futures::select::{Either4, select4};
@@ -56,8 +56,7 @@ where
         }
         if driver.asleep() != asleep {
             asleep = !asleep;
-            // The queue has room: asleep, nothing comes into it, and before, a batch at a time.
-            traffic.sensed.send(if asleep { Sensed::Asleep } else { Sensed::Woken(time) }).await;
+            traffic.tell_sleep((!asleep).then_some(time));
         }
         traffic.tell([*driver.counters(Die::Accel), *driver.counters(Die::Gyro)]);
     }

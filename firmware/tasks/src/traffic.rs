@@ -1,9 +1,9 @@
 //! What passes between the loops.
 
-use core::cell::Cell;
+use crate::queue::{Queue, Sensed};
+use core::cell::{Cell, RefCell};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
 use embassy_sync::pipe::Pipe;
 use embassy_sync::signal::Signal;
 use embedded_io_async::Write;
@@ -11,25 +11,14 @@ use portable_atomic::{AtomicU32, Ordering};
 use sohle_shared::bmx055::{Batch, DieCounters};
 use sohle_shared::time::Micros;
 
-/// Batches that may wait for [`process`](crate::process()): both dies fill 250 in a second.
-const BATCHES: usize = 26;
 /// Bytes that may wait for the line: 22 ms at 921 600 baud.
 const BYTES: usize = 2_048;
 
-/// What [`sense`](crate::sense()) tells.
-#[expect(clippy::large_enum_variant, reason = "there is no heap on the shoe, and nearly all are batches")]
-pub(crate) enum Sensed {
-    /// A die was read.
-    Batch(Batch),
-    /// The sensor was put to sleep.
-    Asleep,
-    /// It was woken at this time.
-    Woken(Micros),
-}
-
 /// What passes between the loops. One, in a `static`.
 pub struct Traffic {
-    pub(crate) sensed: Channel<CriticalSectionRawMutex, Sensed, BATCHES>,
+    sensed: Mutex<CriticalSectionRawMutex, RefCell<Queue>>,
+    /// Something was put into the queue.
+    filled: Signal<CriticalSectionRawMutex, ()>,
     /// Whether the sensor is to sleep.
     pub(crate) rest: Signal<CriticalSectionRawMutex, bool>,
     pub(crate) bytes: Pipe<CriticalSectionRawMutex, BYTES>,
@@ -44,7 +33,8 @@ impl Traffic {
     /// Nothing waits.
     pub const fn new() -> Self {
         Self {
-            sensed: Channel::new(),
+            sensed: Mutex::new(RefCell::new(Queue::new())),
+            filled: Signal::new(),
             rest: Signal::new(),
             bytes: Pipe::new(),
             counters: Mutex::new(Cell::new([DieCounters::NONE; 2])),
@@ -55,8 +45,28 @@ impl Traffic {
 
     /// Queues a batch; without room it is lost and counted, and the tracker sees a gap.
     pub(crate) fn offer(&self, batch: &Batch) {
-        if self.sensed.try_send(Sensed::Batch(batch.clone())).is_err() {
+        self.put(|queue| queue.offer(batch));
+    }
+
+    /// Queues that the sensor fell asleep, or woke at a time. There is room: asleep, nothing else comes into the queue.
+    pub(crate) fn tell_sleep(&self, woken: Option<Micros>) {
+        self.put(|queue| queue.tell(woken));
+    }
+
+    fn put(&self, put: impl FnOnce(&mut Queue) -> bool) {
+        if !self.sensed.lock(|queue| put(&mut queue.borrow_mut())) {
             self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+        self.filled.signal(());
+    }
+
+    /// The oldest of what was queued.
+    pub(crate) async fn sensed(&self) -> Sensed {
+        loop {
+            if let Some(sensed) = self.sensed.lock(|queue| queue.borrow_mut().take()) {
+                return sensed;
+            }
+            self.filled.wait().await;
         }
     }
 
@@ -68,7 +78,7 @@ impl Traffic {
     /// The next batch that was read, for who looks at them without a shoe.
     pub async fn receive(&self) -> Batch {
         loop {
-            if let Sensed::Batch(batch) = self.sensed.receive().await {
+            if let Sensed::Batch(batch) = self.sensed().await {
                 return batch;
             }
         }

@@ -20,6 +20,8 @@ use crate::checksum::CRC32;
 use crate::tracker::Parameters;
 use core::ops::Range;
 use embedded_storage_async::nor_flash::NorFlash;
+use postcard::ser_flavors::Flavor;
+use postcard::serialize_with_flavor;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -177,6 +179,13 @@ impl Record {
         true
     }
 
+    /// Whether it has this very value.
+    fn holds<T: Stored>(&self, value: &T) -> bool {
+        let Some((start, layout, end)) = self.find(T::KEY) else { return false };
+        let left = self.bytes.get(start + ENTRY..end).unwrap_or_default();
+        layout == T::LAYOUT && serialize_with_flavor(value, Same { left }).unwrap_or(false)
+    }
+
     /// Writes the header, and ones up to the end of the last slot.
     fn seal(&mut self, sequence: u32) -> Place {
         let length = self.length as u32;
@@ -201,6 +210,28 @@ impl Record {
         let word = |at: usize| header[at..].first_chunk().map(|word| u32::from_le_bytes(*word));
         let (sequence, length) = (word(4)?, word(8)?);
         (header[..4] == MAGIC && (HEADER as u32..=RECORD as u32).contains(&length)).then_some((sequence, length))
+    }
+}
+
+/// Compares the bytes of a value with others while they are made.
+struct Same<'a> {
+    /// What is to come.
+    left: &'a [u8],
+}
+
+impl Flavor for Same<'_> {
+    type Output = bool;
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        match self.left.split_first() {
+            Some((&first, left)) if first == byte => self.left = left,
+            _ => return Err(postcard::Error::SerializeBufferFull),
+        }
+        Ok(())
+    }
+
+    fn finalize(self) -> postcard::Result<bool> {
+        Ok(self.left.is_empty())
     }
 }
 
@@ -231,7 +262,8 @@ impl<F: NorFlash> Store<F> {
 
     /// The value kept; `None` if there is none.
     pub async fn load<T: Stored>(&mut self) -> Result<Option<T>, Error<F::Error>> {
-        let record = self.record().await?;
+        let mut record = Record::empty();
+        self.fetch(&mut record).await?;
         let Some((start, layout, end)) = record.find(T::KEY) else { return Ok(None) };
         if layout != T::LAYOUT {
             return Err(Error::Layout { stored: layout, expected: T::LAYOUT });
@@ -243,28 +275,23 @@ impl<F: NorFlash> Store<F> {
     /// Keeps `value` in place of the one before; the others stay. If the power fails meanwhile, one of both is found
     /// afterwards. What is kept already is not written again.
     pub async fn save<T: Stored>(&mut self, value: &T) -> Result<(), Error<F::Error>> {
-        let mut record = self.record().await?;
-        let mut alone = Record::empty();
-        if !alone.append(value) {
-            return Err(Error::TooLarge);
-        }
-        if record
-            .find(T::KEY)
-            .is_some_and(|(start, _, end)| record.bytes[start..end] == alone.bytes[HEADER..alone.length])
-        {
+        let mut record = Record::empty();
+        self.fetch(&mut record).await?;
+        if record.holds(value) {
             return Ok(());
         }
         record.remove(T::KEY);
         if !record.append(value) {
             return Err(Error::TooLarge);
         }
-        self.write(record).await
+        self.write(&mut record).await
     }
 
     /// Keeps no such value any more.
     pub async fn forget<T: Stored>(&mut self) -> Result<(), Error<F::Error>> {
-        let mut record = self.record().await?;
-        if record.remove(T::KEY) { self.write(record).await } else { Ok(()) }
+        let mut record = Record::empty();
+        self.fetch(&mut record).await?;
+        if record.remove(T::KEY) { self.write(&mut record).await } else { Ok(()) }
     }
 
     fn page_of(&self, address: u32) -> u32 {
@@ -276,9 +303,8 @@ impl<F: NorFlash> Store<F> {
         self.flash.read(address, bytes).await.map_err(Error::Flash)
     }
 
-    /// The newest record, or an empty one.
-    async fn record(&mut self) -> Result<Record, Error<F::Error>> {
-        let mut record = Record::empty();
+    /// Fills an empty record with the newest one, if there is one.
+    async fn fetch(&mut self, record: &mut Record) -> Result<(), Error<F::Error>> {
         if let Some(Place { address, length, .. }) = self.newest {
             record.length = length as usize;
             self.read(address, &mut record.bytes[..whole_slots(length) as usize]).await?;
@@ -287,10 +313,10 @@ impl<F: NorFlash> Store<F> {
                 return Err(Error::Verify);
             }
         }
-        Ok(record)
+        Ok(())
     }
 
-    /// The record at `address`, if it is intact and ends before `end`.
+    /// The record at `address`, if it is intact and ends before `end`. Read slot by slot, for it is not to be kept.
     async fn intact(&mut self, address: u32, end: u32) -> Result<Option<Place>, Error<F::Error>> {
         let mut slot = [0; SLOT as usize];
         self.read(address, &mut slot).await?;
@@ -298,11 +324,15 @@ impl<F: NorFlash> Store<F> {
         if address + whole_slots(length) > end {
             return Ok(None);
         }
-        let mut record = Record::empty();
-        record.length = length as usize;
-        self.read(address, &mut record.bytes[..whole_slots(length) as usize]).await?;
-        let intact = record.checksum().to_le_bytes() == record.bytes[12..16];
-        Ok(intact.then_some(Place { address, length, sequence }))
+        let mut digest = CRC32.digest();
+        digest.update(&slot[..12]);
+        let sum = [slot[12], slot[13], slot[14], slot[15]];
+        digest.update(&slot[HEADER..length.min(SLOT) as usize]);
+        for start in (SLOT..length).step_by(SLOT as usize) {
+            self.read(address + start, &mut slot).await?;
+            digest.update(&slot[..(length - start).min(SLOT) as usize]);
+        }
+        Ok((digest.finalize().to_le_bytes() == sum).then_some(Place { address, length, sequence }))
     }
 
     /// Finds the newest record and what is free behind it.
@@ -337,7 +367,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Appends `record` to the page of the newest one, or to the page after it.
-    async fn write(&mut self, mut record: Record) -> Result<(), Error<F::Error>> {
+    async fn write(&mut self, record: &mut Record) -> Result<(), Error<F::Error>> {
         let page = F::ERASE_SIZE as u32;
         let mut place = record.seal(self.newest.map_or(0, |newest| newest.sequence.saturating_add(1)));
         let length = whole_slots(place.length);

@@ -9,85 +9,123 @@ use nalgebra::{SMatrix, SVector};
 const NOTHING: f32 = 1e-7;
 /// A pivot below minus this part of it is more than the rounding of a matrix of some ten rows: the matrix is not positive.
 const ROUNDING: f32 = 4e-6;
+/// By such parts correlations are shrunk without calling it a repair.
+const ROUNDINGS: [f32; 3] = [0.0, 1e-6, 1e-5];
 /// What may be left in the column of a direction known exactly, as a correlation: the square root of [`NOTHING`] and more.
 const LEFT_OVER: f32 = 1e-3;
 
-/// The lower triangular `L` with `L L^T = m`, or nothing when `m` has a negative direction or a value that is not finite.
+/// Decomposes `m` with its correlations shrunk by `part`, in its own memory: the upper triangle becomes that of `L^T`, where
+/// `L L^T` is that matrix, and its diagonal is returned. Nothing when it has a negative direction or a value that is not
+/// finite. Only the diagonal and the lower triangle of `m` are read, and they stay.
 ///
-/// Only the lower triangle of `m` is read. A direction of variance zero gives a zero column.
+/// A direction of variance zero gives a zero column.
 ///
 /// # Source
 /// The Cholesky decomposition that Foot, 4.39 and 4.43 ask for, for positive semi-definite matrices.
-pub fn square_root<const N: usize>(m: &SMatrix<f32, N, N>) -> Option<SMatrix<f32, N, N>> {
-    let mut l = SMatrix::<f32, N, N>::zeros();
+fn decompose<const N: usize>(m: &mut SMatrix<f32, N, N>, part: f32) -> Option<SVector<f32, N>> {
+    let left = 1.0 - part;
+    let mut diagonal = SVector::zeros();
     for j in 0..N {
         let mut pivot = m[(j, j)];
         for k in 0..j {
-            pivot -= l[(j, k)] * l[(j, k)];
+            pivot -= m[(k, j)] * m[(k, j)];
         }
         if pivot > NOTHING * m[(j, j)] && pivot.is_finite() {
             let root = libm::sqrtf(pivot);
-            l[(j, j)] = root;
+            diagonal[j] = root;
             for i in j + 1..N {
-                l[(i, j)] = rest(m, &l, i, j) / root;
+                m[(j, i)] = rest(m, left, i, j) / root;
             }
         } else if pivot >= -ROUNDING * m[(j, j)] {
             let consistent = (j + 1..N).all(|i| {
-                let left = rest(m, &l, i, j);
-                left * left <= LEFT_OVER * LEFT_OVER * m[(i, i)] * m[(j, j)]
+                let rest = rest(m, left, i, j);
+                rest * rest <= LEFT_OVER * LEFT_OVER * m[(i, i)] * m[(j, j)]
             });
             if !consistent {
                 return None;
+            }
+            for i in j + 1..N {
+                m[(j, i)] = 0.0;
             }
         } else {
             return None;
         }
     }
-    Some(l)
+    Some(diagonal)
 }
 
-/// Element `(i, j)` of `m` less what the columns before `j` account for.
-fn rest<const N: usize>(m: &SMatrix<f32, N, N>, l: &SMatrix<f32, N, N>, i: usize, j: usize) -> f32 {
-    let mut rest = m[(i, j)];
+/// Element `(i, j)` of the lower triangle less what the columns before `j` account for.
+fn rest<const N: usize>(m: &SMatrix<f32, N, N>, left: f32, i: usize, j: usize) -> f32 {
+    let mut rest = m[(i, j)] * left;
     for k in 0..j {
-        rest -= l[(i, k)] * l[(j, k)];
+        rest -= m[(k, i)] * m[(k, j)];
     }
     rest
 }
 
-/// The square root of `m`, repaired first if it has none. The second part tells whether it was.
+/// The lower triangular `L` of what was [decomposed](decompose) here.
+fn root_of<const N: usize>(decomposed: &SMatrix<f32, N, N>, diagonal: &SVector<f32, N>) -> SMatrix<f32, N, N> {
+    let mut root = SMatrix::from_diagonal(diagonal);
+    for j in 0..N {
+        for i in j + 1..N {
+            root[(i, j)] = decomposed[(j, i)];
+        }
+    }
+    root
+}
+
+/// The lower triangular `L` with `L L^T = m`, or nothing when `m` has a negative direction or a value that is not finite.
+///
+/// Only the lower triangle of `m` is read. A direction of variance zero gives a zero column.
+pub fn square_root<const N: usize>(m: &SMatrix<f32, N, N>) -> Option<SMatrix<f32, N, N>> {
+    let mut decomposed = *m;
+    let diagonal = decompose(&mut decomposed, 0.0)?;
+    Some(root_of(&decomposed, &diagonal))
+}
+
+/// The square root of `m`, a symmetric matrix, repaired first if it has none. The second part tells whether it was.
 ///
 /// Rounding alone makes a matrix with known directions negative by some 1e-6 of its variances. Correlations are shrunk by
 /// that little without calling it a repair.
 pub fn repaired_square_root<const N: usize>(m: &mut SMatrix<f32, N, N>) -> (SMatrix<f32, N, N>, bool) {
-    if let Some(root) = square_root(m) {
+    if let Some(diagonal) = shrink(m, &ROUNDINGS) {
+        let root = root_of(m, &diagonal);
+        mirror(m);
         return (root, false);
     }
-    match shrink(m, &[1e-6, 1e-5]) {
-        Some(root) => (root, false),
-        None => (repair(m), true),
+    repair(m);
+    let root = square_root(m).unwrap_or_else(|| SMatrix::from_diagonal(&m.diagonal().map(libm::sqrtf)));
+    (root, true)
+}
+
+/// Makes sure that `m`, a symmetric matrix, has a square root, as [`repaired_square_root`] does. Whether it was repaired.
+pub fn repair_if_needed<const N: usize>(m: &mut SMatrix<f32, N, N>) -> bool {
+    let good = shrink(m, &ROUNDINGS).is_some();
+    mirror(m);
+    if !good {
+        repair(m);
     }
+    !good
 }
 
-/// Shrinks all correlations by the first of `parts` that gives `m` a square root, and returns that.
-fn shrink<const N: usize>(m: &mut SMatrix<f32, N, N>, parts: &[f32]) -> Option<SMatrix<f32, N, N>> {
-    parts.iter().find_map(|part| {
-        let mut trial = *m * (1.0 - part);
-        for i in 0..N {
-            trial[(i, i)] = m[(i, i)];
+/// Shrinks all correlations by the first of `parts` that gives `m` a square root, which it then is [decomposed](decompose)
+/// into, or by none. The lower triangle is right in any case; [`mirror`] completes the matrix.
+fn shrink<const N: usize>(m: &mut SMatrix<f32, N, N>, parts: &[f32]) -> Option<SVector<f32, N>> {
+    let (part, diagonal) = parts.iter().find_map(|&part| Some((part, decompose(m, part)?)))?;
+    for j in 0..N {
+        for i in j + 1..N {
+            m[(i, j)] *= 1.0 - part;
         }
-        let root = square_root(&trial)?;
-        *m = trial;
-        Some(root)
-    })
+    }
+    Some(diagonal)
 }
 
-/// Turns `m` into the nearest usable covariance along one line and returns its square root: the correlations are shrunk
-/// towards zero, by no more than is needed, and the variances are kept.
+/// Turns `m` into the nearest usable covariance along one line: the correlations are shrunk towards zero, by no more than is
+/// needed, and the variances are kept.
 ///
 /// A variance that is negative or not a number, with all that goes with it, becomes zero; other values that are not
 /// finite become zero as well. The result is symmetric and positive semi-definite whatever came in.
-pub fn repair<const N: usize>(m: &mut SMatrix<f32, N, N>) -> SMatrix<f32, N, N> {
+pub fn repair<const N: usize>(m: &mut SMatrix<f32, N, N>) {
     symmetrise(m);
     for i in 0..N {
         if !(m[(i, i)] > 0.0 && m[(i, i)] < LARGEST) {
@@ -106,12 +144,12 @@ pub fn repair<const N: usize>(m: &mut SMatrix<f32, N, N>) -> SMatrix<f32, N, N> 
             m[(j, i)] = value;
         }
     }
-    if let Some(root) = shrink(m, &[1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1]) {
-        return root;
+    if shrink(m, &[1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1]).is_none() {
+        for j in 0..N {
+            m.view_range_mut(j + 1.., j).fill(0.0);
+        }
     }
-    let variances = SVector::<f32, N>::from_fn(|i, _| m[(i, i)]);
-    *m = SMatrix::from_diagonal(&variances);
-    SMatrix::from_diagonal(&variances.map(libm::sqrtf))
+    mirror(m);
 }
 
 /// Largest variance that is kept, whatever its unit: beyond it the format has no digits left for anything else.
@@ -287,7 +325,8 @@ mod tests {
             more in proptest::array::uniform4(any::<u32>()),
         ) {
             let mut m = M::from_fn(|i, j| f32::from_bits(*bits.get(6 * i + j).unwrap_or(&more[(6 * i + j) % 4])));
-            let l = repair(&mut m);
+            repair(&mut m);
+            let (l, _) = repaired_square_root(&mut m);
             prop_assert!(m.iter().chain(l.iter()).all(|x| x.is_finite()));
             prop_assert!(is_symmetric(&m));
             prop_assert!(m.diagonal().iter().all(|&v| (0.0..=LARGEST).contains(&v)));

@@ -27,7 +27,7 @@
 //! estimation for nonlinear systems", Automatica 36, 2000). Consider states: Schmidt, "Application of state-space methods
 //! to navigation problems", Advances in Control Systems 3, 1966. Lever arm as a state: the project's own.
 
-use super::covariance::{repaired_square_root, symmetrise};
+use super::covariance::{self, symmetrise};
 use super::rebase::{self, Change};
 use super::state::{POSITION, ROTATION, State, VELOCITY};
 use crate::preintegration::Increment;
@@ -314,28 +314,35 @@ impl PivotFilter {
         velocity_bias: &Matrix3<f32>,
         dt: f32,
     ) {
+        let mix = |error: [Vector3<f32>; 5]| {
+            let [rotation, position, velocity, gyro_bias, accel_bias] = error;
+            [
+                back * rotation - gyro_bias * dt,
+                position + position_turn * rotation + velocity * dt,
+                velocity + velocity_turn * rotation + velocity_bias * accel_bias,
+            ]
+        };
         let p = &mut self.covariance;
-        // Rows, then columns. Position first: it needs the others as they were.
-        let rotation = p.fixed_rows::<3>(ROTATION).into_owned();
-        let velocity = p.fixed_rows::<3>(VELOCITY).into_owned();
-        let row = p.fixed_rows::<3>(POSITION) + position_turn * rotation + velocity * dt;
-        p.fixed_rows_mut::<3>(POSITION).copy_from(&row);
-        let row = velocity + velocity_turn * rotation + velocity_bias * p.fixed_rows::<3>(ACCEL_BIAS);
-        p.fixed_rows_mut::<3>(VELOCITY).copy_from(&row);
-        let row = back * rotation - p.fixed_rows::<3>(GYRO_BIAS) * dt;
-        p.fixed_rows_mut::<3>(ROTATION).copy_from(&row);
-
-        // Of the columns, only those of the pose itself are new; where the rows of the others meet them, the upper
-        // triangle has them already.
-        let rotation = p.fixed_view::<POSE, 3>(0, ROTATION).into_owned();
-        let velocity = p.fixed_view::<POSE, 3>(0, VELOCITY).into_owned();
-        let position = p.fixed_view::<POSE, 3>(0, POSITION) + rotation * position_turn.transpose() + velocity * dt;
-        p.fixed_view_mut::<POSE, 3>(0, POSITION).copy_from(&position);
-        let accel_bias = p.fixed_view::<POSE, 3>(0, ACCEL_BIAS) * velocity_bias.transpose();
-        p.fixed_view_mut::<POSE, 3>(0, VELOCITY)
-            .copy_from(&(velocity + rotation * velocity_turn.transpose() + accel_bias));
-        let turned = rotation * back.transpose() - p.fixed_view::<POSE, 3>(0, GYRO_BIAS) * dt;
-        p.fixed_view_mut::<POSE, 3>(0, ROTATION).copy_from(&turned);
+        // `F P`, a column of it being a function of that column of `P` alone. Then the same from the other side: of the columns,
+        // only those of the pose itself are new; where the rows of the others meet them, the upper triangle has them already.
+        for column in 0..FREEDOMS {
+            let part = |first: usize| Vector3::new(p[(first, column)], p[(first + 1, column)], p[(first + 2, column)]);
+            let mixed = mix([ROTATION, POSITION, VELOCITY, GYRO_BIAS, ACCEL_BIAS].map(part));
+            for (first, mixed) in [ROTATION, POSITION, VELOCITY].into_iter().zip(mixed) {
+                for k in 0..3 {
+                    p[(first + k, column)] = mixed[k];
+                }
+            }
+        }
+        for row in 0..POSE {
+            let part = |first: usize| Vector3::new(p[(row, first)], p[(row, first + 1)], p[(row, first + 2)]);
+            let mixed = mix([ROTATION, POSITION, VELOCITY, GYRO_BIAS, ACCEL_BIAS].map(part));
+            for (first, mixed) in [ROTATION, POSITION, VELOCITY].into_iter().zip(mixed) {
+                for k in 0..3 {
+                    p[(row, first + k)] = mixed[k];
+                }
+            }
+        }
         for i in 0..POSE {
             for j in 0..i {
                 let mean = 0.5 * (p[(i, j)] + p[(j, i)]);
@@ -508,8 +515,7 @@ impl PivotFilter {
 
     /// Makes the foot the new origin. Returns the change since the last one.
     pub fn rebase(&mut self) -> Change {
-        let (_, repaired) = repaired_square_root(&mut self.covariance);
-        self.repaired += u32::from(repaired);
+        self.repaired += u32::from(covariance::repair_if_needed(&mut self.covariance));
         let change = self.change();
         rebase::rebase(&mut self.state, &mut self.covariance, change.turn);
         self.reference = self.state.attitude;
@@ -524,7 +530,7 @@ impl PivotFilter {
     }
 
     fn repair(&mut self) {
-        super::covariance::repair(&mut self.covariance);
+        covariance::repair(&mut self.covariance);
         self.repaired = self.repaired.saturating_add(1);
     }
 
@@ -855,7 +861,9 @@ mod tests {
             }
             let change = filter.rebase();
             prop_assert!((0..4).all(|i| change.covariance[(i, i)] >= 0.0));
-            prop_assert!(repair(&mut filter.covariance.clone()).iter().all(|value| value.is_finite()));
+            let mut repaired = filter.covariance;
+            repair(&mut repaired);
+            prop_assert!(repaired.iter().all(|value| value.is_finite()));
         }
     }
 }

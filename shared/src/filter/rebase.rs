@@ -9,7 +9,7 @@
 //! The filter's world is the heading frame of the last re-base (see [`crate::step`]): origin at the foot, z up, and with
 //! each re-base turned by the turn of the foot since the one before. What the first one calls x is arbitrary.
 
-use super::state::{POSITION, ROTATION, State, VELOCITY};
+use super::state::{FREEDOMS, POSITION, ROTATION, State, VELOCITY};
 use crate::so3;
 use nalgebra::{Matrix3, Matrix3x2, Matrix4, SMatrix, UnitQuaternion, Vector3};
 
@@ -46,7 +46,7 @@ pub fn change<const N: usize>(
     let mut read = reading * covariance * reading.transpose();
     // What is known exactly may come out of the sum a rounding below zero.
     super::covariance::symmetrise(&mut read);
-    super::covariance::repaired_square_root(&mut read);
+    super::covariance::repair_if_needed(&mut read);
     Change { displacement: state.position, turn: so3::turn(reference, &state.attitude), covariance: read }
 }
 
@@ -64,14 +64,21 @@ pub fn rebase<const N: usize>(state: &mut State, covariance: &mut SMatrix<f32, N
     let back = so3::rotation_about_z(-turn);
     let back_matrix = back.to_rotation_matrix();
     let sideways = back * Vector3::z().cross(&state.velocity);
-    let mut derivative = SMatrix::<f32, N, N>::identity();
-    derivative.fixed_view_mut::<3, 3>(POSITION, POSITION).fill(0.0);
+    // The derivative of what is turned and mixed; of the states behind it, it is the identity.
+    let mut derivative = SMatrix::<f32, FREEDOMS, FREEDOMS>::zeros();
     derivative.fixed_view_mut::<3, 3>(ROTATION, ROTATION).copy_from(&(horizontal * horizontal.transpose()));
     derivative.fixed_view_mut::<3, 3>(VELOCITY, ROTATION).copy_from(&(-sideways * up.transpose()));
     derivative.fixed_view_mut::<3, 3>(VELOCITY, VELOCITY).copy_from(back_matrix.matrix());
-    let mut moved = derivative * *covariance * derivative.transpose();
-    super::covariance::symmetrise(&mut moved);
-    *covariance = moved;
+    // Column by column, then row by row: each is a function of itself alone.
+    for j in 0..N {
+        let mixed = derivative * covariance.fixed_view::<FREEDOMS, 1>(0, j);
+        covariance.fixed_view_mut::<FREEDOMS, 1>(0, j).copy_from(&mixed);
+    }
+    for i in 0..N {
+        let mixed = derivative * covariance.fixed_view::<1, FREEDOMS>(i, 0).transpose();
+        covariance.fixed_view_mut::<1, FREEDOMS>(i, 0).tr_copy_from(&mixed);
+    }
+    super::covariance::symmetrise(covariance);
     *state = State {
         attitude: so3::renormalised(&(back * state.attitude)),
         position: Vector3::zeros(),
@@ -83,7 +90,6 @@ pub fn rebase<const N: usize>(state: &mut State, covariance: &mut SMatrix<f32, N
 mod tests {
     use super::*;
     use crate::filter::covariance::repaired_square_root;
-    use crate::filter::state::FREEDOMS;
     use proptest::prelude::*;
 
     type Covariance = SMatrix<f32, FREEDOMS, FREEDOMS>;

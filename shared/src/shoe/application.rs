@@ -1,5 +1,6 @@
 //! The application on the shoe.
 
+use super::frames::Frames;
 use super::pipeline::{Pipeline, celsius};
 use crate::bmx055::{Batch, Config, DieCounters};
 use crate::calibration::Calibration;
@@ -12,14 +13,15 @@ use crate::wire::message::{Attitude, FromShoe, Level, Log, Raw, RawItem, Refusal
 use crate::wire::outbox::Outbox;
 use crate::wire::transfer::Value;
 use core::borrow::BorrowMut;
-use heapless::Deque;
 
 /// Between two messages with the attitude. **Units:** microseconds.
 const ATTITUDE_US: i64 = 50_000;
-/// Raw messages that may wait for the line: both dies fill so many in 60 ms, and the line empties one in 3 ms.
-const RAW_WAITING: usize = 16;
-/// Lines of the log that may wait for a laptop: all that happens while the shoe starts.
-const LOGS_WAITING: usize = 8;
+/// Raw messages that may wait for the line. **Units:** bytes. Both dies fill eight messages of a moving foot, 160 bytes each, in
+/// 32 ms; as much again waits in the line's own buffer, and the line empties one in 2 ms.
+const RAW_BYTES: usize = 1_280;
+/// Lines of the log that may wait for a laptop: all that happens while the shoe starts. **Units:** bytes. Last words are a line of
+/// 120 letters.
+const LOG_BYTES: usize = 512;
 
 /// What only the board knows of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,22 +44,23 @@ pub struct Health {
 }
 
 /// The shoe, with room for `STEPS` steps that the laptop does not have yet; they may lie elsewhere, as in [`Link`].
+///
+/// Whoever calls it does one of many things at a time. What is never inlined has its part of the stack for itself, and not
+/// beside that of all the others.
 #[derive(Debug)]
 pub struct Shoe<const STEPS: usize, O = Outbox<STEPS>> {
     sensor: Config,
-    parameters: Parameters,
-    calibration: Calibration,
     pipeline: Pipeline,
     link: Link<STEPS, O>,
     /// Number of the next raw message.
     raw_number: u32,
-    raw: Deque<Raw, RAW_WAITING>,
-    logs: Deque<Log, LOGS_WAITING>,
+    raw: Frames<RAW_BYTES>,
+    logs: Frames<LOG_BYTES>,
     status: Option<Status>,
     attitude: Option<Attitude>,
     attitude_due: Micros,
-    /// A value that takes effect when the board has kept it.
-    keeping: Option<Value>,
+    /// The link runs a request whose value takes effect when the board has kept it.
+    keeping: bool,
     temperature: Option<i8>,
     /// The foot was seen to move, or somebody wanted something.
     moved: Micros,
@@ -79,17 +82,15 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     ) -> Self {
         Self {
             sensor: *sensor,
-            parameters: *parameters,
-            calibration: *calibration,
             pipeline: Pipeline::new(sensor, parameters, calibration),
             link: Link::new(identity, parameters, calibration, outbox),
             raw_number: 0,
-            raw: Deque::new(),
-            logs: Deque::new(),
+            raw: Frames::new(),
+            logs: Frames::new(),
             status: None,
             attitude: None,
             attitude_due: Micros(i64::MIN),
-            keeping: None,
+            keeping: false,
             temperature: None,
             moved: Micros(0),
             seen: Micros(0),
@@ -99,6 +100,7 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     }
 
     /// The driver read something.
+    #[inline(never)]
     pub fn sensed(&mut self, batch: &Batch) {
         if self.link.raw() {
             self.record(RawItem::Batch(batch.clone()));
@@ -121,6 +123,7 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     }
 
     /// Bytes came from the laptop.
+    #[inline(never)]
     pub fn received(&mut self, bytes: &[u8], now: Micros) {
         self.link.receive(bytes, now);
         while let Some(request) = self.link.request() {
@@ -155,40 +158,47 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             Request::Write(Value::Parameters(parameters)) if !parameters.method.available() => {
                 Some(Err(Refusal::Unsupported))
             }
-            Request::Write(value) => {
-                self.keeping = Some(value);
+            Request::Write(_) => {
+                self.keeping = true;
                 None
             }
         }
     }
 
+    #[inline(never)]
     fn record(&mut self, item: RawItem) {
         let raw = Raw { number: self.raw_number, item };
         self.raw_number = self.raw_number.wrapping_add(1);
-        if self.raw.push_back(raw).is_err() {
+        if !self.raw.push(&FromShoe::Raw(raw)) {
             self.link.count_dropped_message();
         }
     }
 
     /// A value that the board has to keep over a loss of power; [`Shoe::kept`] tells when it has.
     pub fn keep(&self) -> Option<&Value> {
-        self.keeping.as_ref()
+        match self.link.running() {
+            Some(Request::Write(value)) if self.keeping => Some(value),
+            _ => None,
+        }
     }
 
     /// The board has kept the value, or could not. With a new value the tracker starts anew.
+    #[inline(never)]
     pub fn kept(&mut self, result: Result<(), Refusal>) {
-        let Some(value) = self.keeping.take() else { return };
+        let Some(value) = self.keep().copied() else { return };
+        self.keeping = false;
         if result.is_ok() {
-            match value {
-                Value::Parameters(parameters) => self.parameters = parameters,
-                Value::Calibration(calibration) => self.calibration = calibration,
+            let (parameters, calibration) = (*self.tracker().parameters(), *self.pipeline.calibration());
+            match &value {
+                Value::Parameters(parameters) => self.pipeline.restart(&self.sensor, parameters, &calibration),
+                Value::Calibration(calibration) => self.pipeline.restart(&self.sensor, &parameters, calibration),
             }
-            self.pipeline.restart(&self.sensor, &self.parameters, &self.calibration);
         }
         self.link.answer(result);
     }
 
     /// The board says how it is, about once in a second.
+    #[inline(never)]
     pub fn report(&mut self, now: Micros, health: &Health) {
         let tracker = self.pipeline.tracker();
         self.status = Some(Status {
@@ -211,33 +221,37 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     }
 
     /// A line for the log; kept for a while when there is no laptop. The oldest gives way.
+    #[inline(never)]
     pub fn log(&mut self, time: Micros, level: Level, line: &str) {
-        if self.logs.is_full() {
-            self.logs.pop_front();
+        let line = FromShoe::Log(Log { time, level, text: text(line) });
+        while !self.logs.push(&line) {
+            if self.logs.pop(&mut [0; FRAME_MAX]).is_none() {
+                return;
+            }
             self.link.count_dropped_message();
         }
-        // There is room now.
-        let _ = self.logs.push_back(Log { time, level, text: text(line) });
     }
 
     /// The next frame for the laptop: steps and answers first.
+    #[inline(never)]
     pub fn transmit<'a>(&mut self, now: Micros, buffer: &'a mut [u8; FRAME_MAX]) -> Option<&'a [u8]> {
-        match self.link.transmit(now, buffer).map(<[u8]>::len) {
-            Some(length) => buffer.get(..length),
-            None => frame::encode(&self.other()?, buffer).ok(),
+        if let Some(length) = self.link.transmit(now, buffer).map(<[u8]>::len) {
+            return buffer.get(..length);
         }
-    }
-
-    fn other(&mut self) -> Option<FromShoe> {
         if !self.link.connected() {
             self.raw.clear();
             (self.status, self.attitude) = (None, None);
             return None;
         }
-        None.or_else(|| self.logs.pop_front().map(FromShoe::Log))
-            .or_else(|| self.raw.pop_front().map(FromShoe::Raw))
-            .or_else(|| self.status.take().map(FromShoe::Status))
-            .or_else(|| self.attitude.take().map(FromShoe::Attitude))
+        if !self.logs.is_empty() {
+            return self.logs.pop(buffer);
+        }
+        if !self.raw.is_empty() {
+            return self.raw.pop(buffer);
+        }
+        let status = self.status.take().map(FromShoe::Status);
+        let message = status.or_else(|| self.attitude.take().map(FromShoe::Attitude))?;
+        frame::encode(&message, buffer).ok()
     }
 
     /// When [`Shoe::transmit`] should be asked again if nothing happens before; a time that has passed means at once.
@@ -249,7 +263,7 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     /// Whether the sensor should sleep: the foot has stood for the time that is set, nobody wants anything, and no raw
     /// recording runs. While it sleeps that stays so until a command comes.
     pub fn drowsy(&self) -> bool {
-        let after_us = (self.parameters.sleep_after_s * 1e6) as i64;
+        let after_us = (self.tracker().parameters().sleep_after_s * 1e6) as i64;
         let still = self.pipeline.tracker().state() == State::Tracking && !self.link.raw();
         still && after_us > 0 && self.seen - self.moved >= after_us
     }
@@ -485,8 +499,9 @@ mod tests {
     #[test]
     fn the_log_of_the_boot_waits_for_a_laptop() {
         let mut shoe = shoe();
-        for line in 0..10 {
-            shoe.log(Micros(line), Level::Info, &std::format!("line {line}"));
+        let lines = |count: usize| [1, 4].map(|shorter| std::format!("{:1$}", "", count / shorter));
+        for (at, line) in (0..6).flat_map(|_| lines(120)).enumerate() {
+            shoe.log(Micros(at as i64), Level::Info, &line);
         }
         shoe.report(Micros(20), &Health { stack: 1_234, ..Health::default() });
         assert!(say(&mut shoe, Micros(20)).iter().all(|message| matches!(message, FromShoe::Hello(_))));
@@ -496,8 +511,9 @@ mod tests {
         assert_eq!(shoe.deadline(Micros(40)), Micros(40));
         let said = say(&mut shoe, Micros(40));
         let lines: Vec<_> = said.iter().filter(|message| matches!(message, FromShoe::Log(_))).collect();
-        assert!(matches!(lines[..], [FromShoe::Log(first), .., FromShoe::Log(last)]
-            if first.text == "line 2" && last.text == "line 9" && lines.len() == LOGS_WAITING));
+        // The newest: two pairs of a long and a short line are 300 bytes with their times.
+        assert!(matches!(lines[..], [.., FromShoe::Log(long), FromShoe::Log(last)]
+            if long.text.len() == 120 && last.text.len() == 30 && last.time == Micros(11) && (4..12).contains(&lines.len())));
         assert!(said.iter().any(|message| matches!(message, FromShoe::Status(status) if status.stack == 1_234)));
         assert!(shoe.deadline(Micros(40)) > Micros(40), "nothing is left");
     }

@@ -6,6 +6,8 @@
 
 #[cfg(feature = "wire")]
 mod application;
+#[cfg(feature = "wire")]
+mod frames;
 mod pipeline;
 
 #[cfg(feature = "wire")]

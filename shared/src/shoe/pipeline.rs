@@ -44,6 +44,11 @@ impl Pipeline {
         self.tracker.restart(parameters);
     }
 
+    /// What corrects the samples.
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
     /// Carries an order out; whether it could be.
     pub fn obey(&mut self, order: Order) -> bool {
         self.tracker.obey(order)

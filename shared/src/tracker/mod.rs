@@ -289,6 +289,11 @@ impl Tracker {
         true
     }
 
+    /// Its settings.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
     /// What the tracker is doing.
     pub fn state(&self) -> State {
         self.way.phase()

@@ -1,13 +1,14 @@
 //! The wire between shoe and laptop: every message once, its bytes, and what makes sure that each step arrives.
 //!
 //! A [`message`] is a postcard value with a checksum in a [`frame`]. A finished step is packed into 40 bytes
-//! ([`packed`]), kept in the [`outbox`] of the shoe until the laptop has acknowledged it, and put in order by the laptop's
+//! ([`packed`]), kept in the [`outbox`] of the shoe (in half as many) until the laptop has acknowledged it, and put in order by the laptop's
 //! [`inbox`]. [`link`] is the shoe's whole end of the wire; the laptop's is in the `sohle` crate. Parameters and calibration,
 //! which are too long for a message, go in pieces ([`transfer`]).
 //!
 //! Both ends compile this module, so there is no second definition of anything; [`SCHEMA`] tells two ends apart that were
 //! compiled from different ones.
 
+mod difference;
 pub mod frame;
 #[cfg(test)]
 mod golden;
@@ -16,6 +17,7 @@ pub mod link;
 pub mod message;
 pub mod outbox;
 pub mod packed;
+mod shelf;
 pub mod transfer;
 
 use crate::calibration::Calibration;

@@ -1,6 +1,6 @@
-//! A finished step in 40 bytes: what the shoe keeps of it until the laptop has it.
+//! A finished step in 40 bytes: what the shoe sends of it to the laptop, and keeps of it (in still less) until it is there.
 //!
-//! A thousand steps are 40 kB instead of the 120 kB of a [`Step`]. What is lost is far below what a step knows:
+//! What is lost of the 120 bytes of a [`Step`] is far below what a step knows:
 //!
 //! | value | unit | range | error at most |
 //! |---|---|---|---|
@@ -51,26 +51,26 @@ const SATURATED: u32 = 1 << 31;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct PackedStep {
     /// 31 bits, and [`SATURATED`].
-    index: [u8; 4],
+    pub(super) index: [u8; 4],
     /// **Units:** microseconds since the boot.
-    stance_end: [u8; 6],
+    pub(super) stance_end: [u8; 6],
     /// **Units:** microseconds.
-    stance_duration: [u8; 4],
-    displacement: [[u8; 3]; 3],
-    turn: [u8; 2],
+    pub(super) stance_duration: [u8; 4],
+    pub(super) displacement: [[u8; 3]; 3],
+    pub(super) turn: [u8; 2],
     /// Two codes of 12 bits in each.
-    sigmas: [[u8; 3]; 2],
+    pub(super) sigmas: [[u8; 3]; 2],
     /// Row by row of the lower triangle: (y, x), (z, x), (z, y), (turn, x), (turn, y), (turn, z).
-    correlations: [i8; 6],
+    pub(super) correlations: [i8; 6],
     /// Bits 0 and 1 the mode, 2 to 7 the quality.
-    mode_and_quality: u8,
-    clipped: [u8; 2],
+    pub(super) mode_and_quality: u8,
+    pub(super) clipped: [u8; 2],
 }
 
 const _: () = assert!(size_of::<PackedStep>() == 40);
 
 impl PackedStep {
-    /// A place for a step.
+    /// Before the first step.
     pub(super) const EMPTY: Self = Self {
         index: [0; 4],
         stance_end: [0; 6],

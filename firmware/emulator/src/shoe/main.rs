@@ -22,6 +22,7 @@ use interrupt::Irq;
 use panic_semihosting as _;
 use sensor::{Bus, Pin, Walk};
 use sohle_shared::bmx055::blocking::Blocking;
+use sohle_shared::bmx055::counts::Header;
 use sohle_shared::bmx055::twin::{Chip, SimulatedBmx055, SimulatedDelay};
 use sohle_shared::bmx055::{Bmx055, Config, Die};
 use sohle_shared::calibration::Calibration;
@@ -36,10 +37,15 @@ use stack::Painted;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// Steps that the shoe keeps for the laptop.
-const STEPS: usize = 1_024;
+const STEPS: usize = 1_000;
 /// Priorities: a low number goes before a high one.
 const SENSE_PRIORITY: u8 = 128;
 const PROCESS_PRIORITY: u8 = 192;
+
+unsafe extern "C" {
+    /// First word above the stack, from the memory map.
+    static _stack_start: u32;
+}
 
 static TRAFFIC: Traffic = Traffic::new();
 static SENSE: InterruptExecutor = InterruptExecutor::new();
@@ -103,33 +109,31 @@ async fn sensing(twin: &'static RefCell<Twin>) {
 
 /// Starts the rest.
 #[embassy_executor::task]
-async fn start_processing(stack: Painted) {
+async fn start_processing(shoe: &'static mut Wearer, stack: Painted) {
     let (received, sent) = uart::start();
     // SAFETY: as above.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    spawner.spawn(processing(received, stack).expect("started once"));
+    spawner.spawn(processing(shoe, received, stack).expect("started once"));
     spawner.spawn(sending(sent).expect("started once"));
 }
 
 /// The shoe with its steps elsewhere.
 type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS>>;
 
-/// Builds the shoe where it stays. Apart, so that what the building takes of the stack is free afterwards.
+/// A shoe. Not inlined: like this the compiler makes it where the caller wants it, and not a second one beside it.
 #[inline(never)]
-fn build() -> &'static mut Wearer {
+fn make() -> Wearer {
     static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::blank());
-    static SHOE: StaticCell<Wearer> = StaticCell::new();
     // There is one boot: the line is new with every start of the emulator.
     let identity = Identity { boot: 1, firmware: env!("CARGO_PKG_VERSION"), board: "mps2-an386" };
-    let (sensor, parameters, calibration) = (Config::default(), Parameters::default(), Calibration::default());
     let outbox = OUTBOX.take();
     outbox.begin(Pace::SERIAL);
-    SHOE.init_with(|| Shoe::new(identity, &sensor, &parameters, &calibration, outbox))
+    Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default(), outbox)
 }
 
 #[embassy_executor::task]
-async fn processing(line: uart::Receiver, stack: Painted) {
-    process(&TRAFFIC, build(), line, Machine { stack, asked: (0, 0) }).await
+async fn processing(shoe: &'static mut Wearer, line: uart::Receiver, stack: Painted) {
+    process(&TRAFFIC, shoe, line, Machine { stack, asked: (0, 0) }).await
 }
 
 #[embassy_executor::task]
@@ -151,9 +155,20 @@ unsafe fn DefaultHandler(number: i16) {
     }
 }
 
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    let stack = stack::paint();
+/// Starts clock and tasks. Not inlined: what it takes of the stack is free again when the tasks run.
+#[inline(never)]
+fn set_off(header: Header, shoe: &'static mut Wearer, stack: Painted) {
+    clock::start();
+    interrupt::prioritise(Irq::SENSE, SENSE_PRIORITY);
+    interrupt::prioritise(Irq::PROCESS, PROCESS_PRIORITY);
+    let sensing = start_sensing(header.accel_period_ns, header.gyro_period_ns).expect("started once");
+    SENSE.start(Irq::SENSE).spawn(sensing);
+    PROCESS.start(Irq::PROCESS).spawn(start_processing(shoe, stack).expect("started once"));
+}
+
+/// Opens the walk. No board has one, so this comes before the stack is watched.
+#[inline(never)]
+fn open_walk() -> Header {
     let Some(walk) = Walk::open() else {
         heprintln!("error: no walk; expected the name of a file that 'sohle convert' wrote");
         debug::exit(debug::EXIT_FAILURE);
@@ -161,12 +176,17 @@ fn main() -> ! {
     };
     let header = *walk.header();
     critical_section::with(|cs| WALK.borrow_ref_mut(cs).replace(walk));
-    clock::start();
-    interrupt::prioritise(Irq::SENSE, SENSE_PRIORITY);
-    interrupt::prioritise(Irq::PROCESS, PROCESS_PRIORITY);
-    let sensing = start_sensing(header.accel_period_ns, header.gyro_period_ns).expect("started once");
-    SENSE.start(Irq::SENSE).spawn(sensing);
-    PROCESS.start(Irq::PROCESS).spawn(start_processing(stack).expect("started once"));
+    header
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let mut shoe = make();
+    let shoe = &raw mut shoe;
+    // SAFETY: this function never returns, so its frame and the shoe in it stay for ever, and this is the only reference.
+    let shoe: &'static mut Wearer = unsafe { &mut *shoe };
+    let header = open_walk();
+    set_off(header, shoe, stack::paint(Some((&raw const _stack_start).addr() as u32)));
     loop {
         // Masked, an interrupt still ends the sleep, but is served after the time was taken.
         cortex_m::interrupt::disable();
