@@ -17,4 +17,4 @@ pub mod xyz10;
 
 pub use error::Error;
 pub use georeference::Georeference;
-pub use model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Room};
+pub use model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Node, Room, WalkGraph};
