@@ -13,6 +13,8 @@ pub mod geometry;
 pub mod georeference;
 pub mod hcu;
 mod model;
+pub mod open;
+pub mod picture;
 pub mod xyz10;
 
 pub use error::Error;
