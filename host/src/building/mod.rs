@@ -8,6 +8,7 @@
 
 pub mod error;
 mod features;
+pub mod generate;
 pub mod geojson;
 pub mod geometry;
 pub mod georeference;
@@ -18,5 +19,6 @@ pub mod picture;
 pub mod xyz10;
 
 pub use error::Error;
+pub use geometry::{Outline, Point, Segment};
 pub use georeference::Georeference;
 pub use model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Node, Room, WalkGraph};

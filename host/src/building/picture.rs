@@ -205,6 +205,8 @@ impl Plan {
         let rooms = floor.rooms.iter().map(|room| (&room.name, &room.outline));
         let areas = building.connectors.iter().flat_map(|connector| {
             let here = connector.outlines.iter().filter(|(number, _)| *number == floor.number);
+            // One that lies in a room has the room's name already.
+            let here = here.filter(|(_, outline)| floor.room_at(geometry::centre(outline)).is_none());
             here.map(|(_, outline)| (&connector.name, outline))
         });
         for (name, outline) in rooms.chain(areas) {
