@@ -12,6 +12,8 @@ pub(super) struct RawFeature {
     pub properties: JsonObject,
     pub points: Vec<Point>,
     pub lines: Vec<Vec<Point>>,
+    /// For each point of each line its third coordinate, if it has one.
+    pub line_heights: Vec<Vec<Option<f64>>>,
     /// Outer border and holes; the repeated last corner is left out.
     pub polygons: Vec<Vec<Outline>>,
 }
@@ -74,11 +76,9 @@ fn add(raw: &mut RawFeature, geometry: &Geometry) -> Result<(), String> {
     match &geometry.value {
         GeometryValue::Point { coordinates } => raw.points.push(point(coordinates)?),
         GeometryValue::MultiPoint { coordinates } => raw.points.extend(line(coordinates)?),
-        GeometryValue::LineString { coordinates } => raw.lines.push(line(coordinates)?),
+        GeometryValue::LineString { coordinates } => add_line(raw, coordinates)?,
         GeometryValue::MultiLineString { coordinates } => {
-            for coordinates in coordinates {
-                raw.lines.push(line(coordinates)?);
-            }
+            coordinates.iter().try_for_each(|coordinates| add_line(raw, coordinates))?;
         }
         GeometryValue::Polygon { coordinates } => raw.polygons.push(polygon(coordinates)?),
         GeometryValue::MultiPolygon { coordinates } => {
@@ -90,6 +90,12 @@ fn add(raw: &mut RawFeature, geometry: &Geometry) -> Result<(), String> {
             geometries.iter().try_for_each(|geometry| add(raw, geometry))?;
         }
     }
+    Ok(())
+}
+
+fn add_line(raw: &mut RawFeature, positions: &[Position]) -> Result<(), String> {
+    raw.lines.push(line(positions)?);
+    raw.line_heights.push(positions.iter().map(|position| position.as_slice().get(2).copied()).collect());
     Ok(())
 }
 

@@ -345,6 +345,21 @@ mod tests {
     }
 
     #[test]
+    fn the_committed_files_are_what_is_generated() {
+        let committed = [
+            (twin(2), include_str!("../../../buildings/twin.geojson")),
+            (large(1), include_str!("../../../buildings/large.geojson")),
+        ];
+        for (building, text) in committed {
+            assert!(
+                super::super::geojson::write(&building).unwrap() == text,
+                "sohle building generate makes {}",
+                building.name
+            );
+        }
+    }
+
+    #[test]
     fn the_large_one_is_large() {
         let building = large(1);
         assert_eq!(building.floors.len(), 6);

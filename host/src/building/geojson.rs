@@ -7,15 +7,18 @@
 //! ```
 //! Every feature has the properties `kind` and `floor`: `wall` (lines), `door` (a line of two points), `room` (a polygon,
 //! with `name` and `usage`), `stairs`, `ramp`, `elevator` (a polygon for each floor; those of one `name` belong together; the
-//! first may have `way`, a list of x, y, z in metres), `entrance` (a point, with `name`). Coordinates are longitude and
+//! first may have `way`, a list of x, y, z in metres), `entrance` (a point, with `name`), `path` (lines of the walk graph: a
+//! node is where a line begins, bends or ends, a third coordinate its height in metres; those that climb have `to_floor`).
+//! Coordinates are longitude and
 //! latitude; of a building that is somewhere (`"kind": "local"`) they are metres, and `crs_note` says so.
 
 use super::error::Error;
 use super::features::{self, RawFeature};
 use super::geometry::{Outline, Point, Segment};
 use super::georeference::{Georeference, Projection};
-use super::model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Room};
+use super::model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Node, Room, WalkGraph};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// The foreign member that makes a feature collection a building.
 const MEMBER: &str = "sohle_building";
@@ -64,12 +67,18 @@ pub fn parse(text: &str, file: &str) -> Result<Building, Error> {
         ..Building::default()
     };
     let projection = building.georeference.projection()?;
+    let mut paths = Paths::default();
     for mut feature in features::features(collection, file)? {
         if let Some(projection) = &projection {
             project(&mut feature, projection).map_err(|error| feature.error(file, error.to_string()))?;
         }
-        add(&mut building, &feature).map_err(|what| feature.error(file, what))?;
+        if feature.text("kind").as_deref() == Some("path") {
+            paths.add(&building.floors, &feature).map_err(|what| feature.error(file, what))?;
+        } else {
+            add(&mut building, &feature).map_err(|what| feature.error(file, what))?;
+        }
     }
+    building.graph = (!paths.graph.edges.is_empty()).then_some(paths.graph);
     building.assembled()
 }
 
@@ -121,7 +130,9 @@ fn add(building: &mut Building, feature: &RawFeature) -> Result<(), String> {
             _ => return Err("an entrance is a point".to_owned()),
         },
         other => {
-            return Err(format!("'{other}' is no kind: wall, door, room, stairs, ramp, elevator and entrance are"));
+            return Err(format!(
+                "'{other}' is no kind: wall, door, room, stairs, ramp, elevator, entrance and path are"
+            ));
         }
     }
     Ok(())
@@ -152,6 +163,58 @@ fn add_connector(
         }
     }
     Ok(())
+}
+
+/// Paths put together to a graph.
+#[derive(Default)]
+struct Paths {
+    graph: WalkGraph,
+    /// Nodes by floor and by place in [`NODE_M`].
+    found: BTreeMap<(i32, [i64; 3]), usize>,
+}
+
+/// Ends of paths that are nearer than this are one node. **Units:** m.
+const NODE_M: f64 = 1e-3;
+
+impl Paths {
+    fn add(&mut self, floors: &[Floor], feature: &RawFeature) -> Result<(), String> {
+        let from = feature.integer("floor").ok_or("it has no 'floor' that is a whole number")?;
+        let to = match feature.properties.get("to_floor") {
+            None => from,
+            Some(_) => feature.integer("to_floor").ok_or("'to_floor' is no whole number")?,
+        };
+        let height = |number: i32| {
+            let floor = floors.iter().find(|floor| floor.number == number);
+            floor.map(|floor| floor.height_m).ok_or(format!("floor {number} is not among the floors of '{MEMBER}'"))
+        };
+        let heights = [height(from)?, height(to)?];
+        if feature.lines.iter().all(|line| line.len() < 2) {
+            return Err("a path is made of lines".to_owned());
+        }
+        for (line, drawn) in feature.lines.iter().zip(&feature.line_heights) {
+            if from != to && line.len() != 2 {
+                return Err("a path that climbs is made of lines of two points".to_owned());
+            }
+            for (pair, drawn) in line.windows(2).zip(drawn.windows(2)) {
+                let mut edge = [0; 2];
+                for end in 0..2 {
+                    let height_m = drawn[end].unwrap_or(heights[end]);
+                    edge[end] = self.node(Node { floor: [from, to][end], place: pair[end], height_m });
+                }
+                self.graph.edges.push(edge);
+            }
+        }
+        Ok(())
+    }
+
+    fn node(&mut self, node: Node) -> usize {
+        let cell = [node.place[0], node.place[1], node.height_m].map(|value| (value / NODE_M).round() as i64);
+        let nodes = &mut self.graph.nodes;
+        *self.found.entry((node.floor, cell)).or_insert_with(|| {
+            nodes.push(node);
+            nodes.len() - 1
+        })
+    }
 }
 
 /// The text of a building: one feature for all walls of a floor, one for each other part. Coordinates are rounded to the
@@ -199,6 +262,9 @@ pub fn write(building: &Building) -> Result<String, Error> {
     for entrance in &building.entrances {
         let geometry = json!({"type": "Point", "coordinates": place.point(entrance.place)?});
         features.push(feature("entrance", entrance.floor, Some(&entrance.name), geometry));
+    }
+    if let Some(graph) = &building.graph {
+        features.extend(place.paths(graph)?);
     }
     let header = Header {
         version: VERSION,
@@ -261,6 +327,29 @@ impl Placer {
         Ok(lines)
     }
 
+    /// One feature for all edges between the same two floors.
+    fn paths(&self, graph: &WalkGraph) -> Result<Vec<Value>, Error> {
+        let mut groups: BTreeMap<[i32; 2], Vec<[[f64; 3]; 2]>> = BTreeMap::new();
+        for edge in &graph.edges {
+            let mut ends = edge.map(|index| graph.nodes[index]);
+            ends.sort_by_key(|node| node.floor);
+            let mut line = [[0.0; 3]; 2];
+            for (written, node) in line.iter_mut().zip(ends) {
+                let [x, y] = self.point(node.place)?;
+                *written = [x, y, millimetres(node.height_m)];
+            }
+            groups.entry(ends.map(|node| node.floor)).or_default().push(line);
+        }
+        let write = |([from, to], lines): ([i32; 2], Vec<_>)| {
+            let mut part = feature("path", from, None, json!({"type": "MultiLineString", "coordinates": lines}));
+            if from != to {
+                part["properties"]["to_floor"] = json!(to);
+            }
+            part
+        };
+        Ok(groups.into_iter().map(write).collect())
+    }
+
     fn polygon(&self, outline: &[Point]) -> Result<Value, Error> {
         let mut ring = outline.iter().map(|point| self.point(*point)).collect::<Result<Vec<_>, _>>()?;
         ring.extend(ring.first().copied());
@@ -289,6 +378,14 @@ mod tests {
             outlines: vec![(0, square.clone()), (1, square.clone())],
             way,
         };
+        let node = |floor, place, height_m| Node { floor, place, height_m };
+        let nodes = vec![
+            node(0, [0.0, 1.5], 0.0),
+            node(0, [0.5, 0.5], 0.0),
+            node(0, [0.5, 4.0], 1.75),
+            node(1, [0.5, 0.5], 3.5),
+        ];
+        let graph = WalkGraph { nodes, edges: vec![[0, 1], [1, 2], [2, 3]] };
         Building {
             name: "House".into(),
             georeference,
@@ -298,6 +395,7 @@ mod tests {
                 connector("e1", ConnectorKind::Elevator, Vec::new()),
             ],
             entrances: vec![Entrance { name: "main".into(), floor: 0, place: [0.0, 1.5] }],
+            graph: Some(graph),
         }
         .assembled()
         .unwrap()
@@ -311,12 +409,64 @@ mod tests {
         assert!(text.contains("crs_note"));
     }
 
+    fn place() -> impl Strategy<Value = Point> {
+        // Millimetres, as they are written.
+        [-400_000_i32..400_000, -400_000_i32..400_000].prop_map(|place| place.map(|value| f64::from(value) / 1e3))
+    }
+
+    fn any_floor() -> impl Strategy<Value = Floor> {
+        let wall = prop::collection::vec((place(), place()).prop_map(|(a, b)| [a, b]), 1..6);
+        let door = (place(), place(), prop::option::of("[a-z]{1,4}"));
+        let doors = prop::collection::vec(door.prop_map(|(a, b, name)| Door { line: [a, b], name }), 0..4);
+        let outline = prop::collection::vec(place(), 3..7).prop_filter("open", |ring| ring.first() != ring.last());
+        let room = ("[a-z\"\\\\ü/]{1,6}", prop::option::of("[a-z]{1,6}"), outline);
+        let rooms = prop::collection::vec(room.prop_map(|(name, usage, outline)| Room { name, usage, outline }), 0..4);
+        (wall, doors, rooms, "[a-z ]{0,5}").prop_map(|(walls, doors, rooms, name)| Floor {
+            name,
+            walls,
+            doors,
+            rooms,
+            ..Floor::default()
+        })
+    }
+
+    fn any_building() -> impl Strategy<Value = Building> {
+        let nodes = prop::collection::vec((0..3_i32, place(), 0..9_000_i32), 2..6);
+        (prop::collection::vec(any_floor(), 3), -9..9_i32, nodes, any::<bool>(), place()).prop_map(
+            |(mut floors, lowest, nodes, drawn, entrance)| {
+                for (number, floor) in (lowest..).zip(&mut floors) {
+                    (floor.number, floor.height_m) = (number, f64::from(number) * 3.21);
+                }
+                let edges = (1..nodes.len()).map(|node| [node - 1, node]).collect();
+                let node =
+                    |(floor, place, height)| Node { floor: lowest + floor, place, height_m: f64::from(height) / 1e3 };
+                let graph = WalkGraph { nodes: nodes.into_iter().map(node).collect(), edges };
+                let entrances = vec![Entrance { name: "main".into(), floor: lowest, place: entrance }];
+                let graph = drawn.then_some(graph);
+                Building { name: "any".into(), floors, entrances, graph, ..Building::default() }.assembled().unwrap()
+            },
+        )
+    }
+
     proptest! {
+        #[test]
+        fn any_local_building_is_read_as_it_was_written(building in any_building()) {
+            let text = write(&building).unwrap();
+            let back = parse(&text, "any").unwrap();
+            prop_assert_eq!(&write(&back).unwrap(), &text);
+            // Nodes are numbered anew: the text above has compared their edges.
+            let bare = |building: &Building| Building { graph: None, ..building.clone() };
+            prop_assert_eq!(bare(&back), bare(&building));
+        }
+
         #[test]
         fn a_building_on_earth_is_read_to_a_tenth_of_a_millimetre(
             longitude in -179.0_f64..179.0, latitude in -80.0_f64..80.0, corner in 1.0_f64..100.0,
+            plane in any::<bool>(), rotation_deg in -180.0_f64..180.0,
         ) {
-            let building = house(Georeference::around(longitude, latitude).unwrap(), corner);
+            let zone = Georeference::around(longitude, latitude).unwrap();
+            let plane = plane.then_some(Georeference::Geographic { origin: [longitude, latitude], rotation_deg });
+            let building = house(plane.unwrap_or(zone), corner);
             let back = parse(&write(&building).unwrap(), "house").unwrap();
             prop_assert_eq!(back.georeference, building.georeference);
             prop_assert_eq!(back.floors.len(), 2);
@@ -338,12 +488,21 @@ mod tests {
     }
 
     #[test]
+    fn the_example_for_people_is_a_building() {
+        let page = include_str!("../../../docs/building.md");
+        let example = page.split("```json").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+        let building = parse(example, "docs/building.md").unwrap();
+        assert_eq!((building.floors.len(), building.floors[0].walls.len()), (2, 5));
+        assert_eq!(building.floors[0].room_at([1.0, 1.0]).unwrap().name, "Hall");
+    }
+
+    #[test]
     fn what_is_wrong_is_told_with_its_feature() {
         let text = write(&house(Georeference::Local, 5.0)).unwrap();
         let message = |from: &str, to: &str| parse(&text.replacen(from, to, 1), "h.geojson").unwrap_err().to_string();
         assert_eq!(
             message("\"kind\":\"door\"", "\"kind\":\"dor\""),
-            "h.geojson, feature 2: 'dor' is no kind: wall, door, room, stairs, ramp, elevator and entrance are"
+            "h.geojson, feature 2: 'dor' is no kind: wall, door, room, stairs, ramp, elevator, entrance and path are"
         );
         assert_eq!(
             message("\"floor\":0,\"kind\":\"door\"", "\"floor\":7,\"kind\":\"door\""),

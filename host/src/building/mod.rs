@@ -1,7 +1,8 @@
 //! The building: what every method that uses a map works on.
 //!
 //! A [`Building`] has floors with walls, doors and rooms, and what joins the floors: stairs, ramps, elevators. All formats
-//! become one: [`geojson`] is the project's own, which any GIS shows and edits; each other reader is a file of its own.
+//! become one: [`geojson`] is the project's own, which any GIS shows and edits; each other reader is a file of its own, and [`open`]
+//! recognises which. [`generate`] makes buildings for evaluation, [`route`] finds ways through one, [`picture`] draws it.
 //!
 //! # Frame
 //! x east, y north, z up from the origin of the building, in metres. [`Georeference`] tells where that is.
@@ -14,9 +15,12 @@ pub mod geometry;
 pub mod georeference;
 pub mod hcu;
 mod model;
+pub mod open;
+pub mod picture;
 pub mod route;
 pub mod xyz10;
 
 pub use error::Error;
+pub use geometry::{Outline, Point, Segment};
 pub use georeference::Georeference;
-pub use model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Room};
+pub use model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Node, Room, WalkGraph};

@@ -18,6 +18,8 @@ pub struct Building {
     pub connectors: Vec<Connector>,
     /// Where one comes in.
     pub entrances: Vec<Entrance>,
+    /// The ways that people take, if somebody drew them.
+    pub graph: Option<WalkGraph>,
 }
 
 /// A floor. **Units:** m; **Frame:** building.
@@ -107,13 +109,33 @@ pub struct Entrance {
     pub place: Point,
 }
 
+/// The ways that people take: places, and which of them one can walk between, in both directions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WalkGraph {
+    /// The places.
+    pub nodes: Vec<Node>,
+    /// Pairs of indices into the nodes.
+    pub edges: Vec<[usize; 2]>,
+}
+
+/// A place of a [`WalkGraph`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Node {
+    /// Number of the floor; on stairs that of the floor below.
+    pub floor: i32,
+    /// Where. **Units:** m; **Frame:** building.
+    pub place: Point,
+    /// Above the origin of the building; on stairs between the heights of the floors. **Units:** m.
+    pub height_m: f64,
+}
+
 impl Building {
     /// Puts the floors in order and checks that the parts fit together.
     ///
     /// # Errors
     /// Without floors, when two have the same number or height, when something is no number or farther than 5 km from
-    /// the origin, when an outline has fewer than three corners, or when a connector or an entrance names a floor that is
-    /// not there or a name is taken.
+    /// the origin, when an outline has fewer than three corners, when a connector, an entrance or a node of the graph names
+    /// a floor that is not there, when a name is taken, or when an edge of the graph ends at no node.
     pub fn assembled(mut self) -> Result<Self, Error> {
         self.floors.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
         let wrong = |what: String| Err(Error::Model(what));
@@ -163,6 +185,9 @@ impl Building {
                 return wrong(format!("entrance '{}' is at no place", entrance.name));
             }
         }
+        if let Some(graph) = &self.graph {
+            check_graph(graph, &numbers)?;
+        }
         Ok(self)
     }
 
@@ -207,6 +232,25 @@ fn check_outline(outline: &[Point], what: &str) -> Result<(), Error> {
         )));
     }
     Ok(())
+}
+
+fn check_graph(graph: &WalkGraph, numbers: &BTreeSet<i32>) -> Result<(), Error> {
+    for (index, node) in graph.nodes.iter().enumerate() {
+        if !numbers.contains(&node.floor) {
+            return Err(Error::Model(format!(
+                "node {index} of the graph is on floor {}, which is not there",
+                node.floor
+            )));
+        }
+        if !is_place(&node.place) || !is_place(&[node.height_m, 0.0]) {
+            return Err(Error::Model(format!("node {index} of the graph is at no place")));
+        }
+    }
+    let count = graph.nodes.len();
+    match graph.edges.iter().position(|edge| edge.iter().any(|&node| node >= count)) {
+        Some(edge) => Err(Error::Model(format!("edge {edge} of the graph ends at a node that is not there"))),
+        None => Ok(()),
+    }
 }
 
 impl Floor {
@@ -282,5 +326,17 @@ mod tests {
             way: Vec::new(),
         });
         assert_eq!(message(bad), "connector 's' is on floor 3, which is not there");
+        let node = Node::default();
+        let drawn = |nodes, edges| {
+            let graph = Some(WalkGraph { nodes, edges });
+            message(Building { graph, ..two(vec![floor(0, 0.0)]) })
+        };
+        let high = Node { height_m: f64::INFINITY, ..node };
+        assert_eq!(
+            drawn(vec![Node { floor: 2, ..node }], vec![]),
+            "node 0 of the graph is on floor 2, which is not there"
+        );
+        assert_eq!(drawn(vec![node, high], vec![]), "node 1 of the graph is at no place");
+        assert_eq!(drawn(vec![node], vec![[0, 0], [0, 1]]), "edge 1 of the graph ends at a node that is not there");
     }
 }

@@ -6,6 +6,7 @@
 //! was wrong).
 
 pub mod bench;
+pub mod building;
 pub mod calibrate;
 pub mod command;
 pub mod convert;
@@ -48,6 +49,7 @@ pub struct Cli {
 enum Command {
     Demo(demo::Args),
     Replay(replay::Args),
+    Building(building::Args),
     Calibrate(calibrate::Args),
     Convert(convert::Args),
     Evaluate(evaluate::Args),
@@ -90,6 +92,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
     match command {
         Command::Demo(args) => demo::run(args),
         Command::Replay(args) => replay::run(args),
+        Command::Building(args) => building::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),

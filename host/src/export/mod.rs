@@ -5,10 +5,10 @@
 
 pub mod file;
 pub mod geojson;
-mod pen;
+pub(crate) mod pen;
 pub mod picture;
 pub mod png;
-mod scale;
+pub(crate) mod scale;
 pub mod steps_csv;
 pub mod svg;
 

@@ -32,6 +32,8 @@ pub enum Purpose {
     FromShoe,
     /// Steps that nobody walked.
     MadeUpSteps,
+    /// How wide the rooms of a made-up building are.
+    Rooms,
 }
 
 impl Random {
