@@ -217,7 +217,8 @@ fn within_budget(statics: u64, stack: u32) -> Result<(), Failure> {
 }
 
 /// A short walk with a sensor that sleeps soon: the shoe must sleep before and after it, and miss no step. What
-/// the processor does then goes to the twin's readings for the most part, which no real board has to make. Depth of the stack.
+/// the processor does then goes to the twin's readings for the most part, which no real board has to make. Tells the depth
+/// of the stack.
 fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<u32, Failure> {
     let parameters = |seconds: u32| {
         let path = folder.join("parameters.toml");
@@ -247,7 +248,8 @@ fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<u32, Failure> {
     Ok(slept.stack.max(awake.stack).unwrap_or_default())
 }
 
-/// The first walk over a line that damages bytes and loses pieces, both ways: every step must arrive, once. Depth of the stack.
+/// The first walk over a line that damages bytes and loses pieces, both ways: every step must arrive, once. Tells the depth
+/// of the stack.
 fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<u32, Failure> {
     let (shoe, laptop) = (free_port()?, free_port()?);
     let running = Running::start(shoe, counts)?;

@@ -1,7 +1,7 @@
 //! What was read of the sensor and waits for the tracker.
 //!
-//! A batch has room for a whole FIFO and holds a half or a quarter of one: here its frames lie behind those of the batch before, so
-//! that as much waits in half the memory.
+//! A batch has room for a whole FIFO and holds a half or a quarter of one: here its frames lie behind those of the batch
+//! before, so that as much waits in half the memory.
 
 use heapless::{Deque, Vec};
 use sohle_shared::bmx055::{Batch, Die};

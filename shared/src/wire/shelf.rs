@@ -1,8 +1,8 @@
 //! Steps one after the other in little memory: the newest is added, the oldest taken away, any looked at.
 //!
 //! Each is kept as its [difference](super::difference) to the one before, bit by bit in a ring. To look at one, those
-//! between it and the one that was looked at last are read over, or those between it and the oldest: of the steps that are sent one after
-//! the other each is read once.
+//! between it and the one that was looked at last are read over, or those between it and the oldest: of the steps that are
+//! sent one after the other each is read once.
 
 use super::difference::{Before, LONGEST, Sink, Source};
 use super::packed::PackedStep;
