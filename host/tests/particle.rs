@@ -46,7 +46,7 @@ fn building() -> Arc<Map> {
     };
     let stairs = rectangle([36.0, 2.0], [40.0, 12.0]);
     let connector = Connector { kind: ConnectorKind::Stairs, outlines: vec![(0, stairs.clone()), (1, stairs)] };
-    Arc::new(Map::new(vec![plan(0, 0.0), plan(1, 3.5)], vec![connector]).unwrap())
+    Arc::new(Map::new(vec![plan(0, 0.0), plan(1, 3.5)], vec![connector]).expect("it is a building"))
 }
 
 /// A stance of the foot. **Units:** m, rad.
@@ -123,7 +123,7 @@ fn errors(filter: &mut ParticleFilter, stances: &[Stance], steps: &[Step]) -> Ve
         .zip(&stances[1..])
         .map(|(step, truth)| {
             let estimate = filter.step(step);
-            let place = estimate.place().unwrap();
+            let place = estimate.place().expect("particles never vanish");
             let floor = i32::from(truth.place.z > 1.85);
             // Half-way up, either floor is right.
             let right = place.floor == floor || (truth.place.z - 1.75).abs() < 0.5;

@@ -107,7 +107,7 @@ fn plane(origin: [f64; 2], rotation_deg: f64) -> Result<Projection, Error> {
             "the origin has longitude {longitude} and latitude {latitude}; expected degrees up to 180 and 84, in this order"
         )));
     }
-    if !(rotation_deg.abs() <= 360.0) {
+    if rotation_deg.is_nan() || rotation_deg.abs() > 360.0 {
         return Err(Error::Model(format!("the building is turned by {rotation_deg} degrees; expected up to 360")));
     }
     let latitude = latitude.to_radians();

@@ -142,7 +142,7 @@ impl Ancestry {
             }
             floors[floor] += weight;
         }
-        if !(total > 0.0) {
+        if total <= 0.0 {
             return None;
         }
         let mean = sum.map(|value| value / total);

@@ -319,7 +319,7 @@ impl ParticleFilter {
     /// Makes the estimate.
     fn tell(&mut self, time: Option<Micros>, step: u32, total: f64, effective: f64, likelihood: f64) {
         let p = &self.parameters;
-        let mut clusters = if !(total > 0.0) {
+        let mut clusters = if total <= 0.0 {
             Vec::new()
         } else if p.method == Method::Documented && self.particles.len() <= p.cluster_most {
             let mut stream = Stream::new(self.seed, Purpose::Cluster, self.number, 0);
