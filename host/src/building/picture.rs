@@ -50,13 +50,44 @@ pub struct Mark {
     pub look: Look,
 }
 
+/// A path on a floor. **Units:** m; **Frame:** building.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// What it is.
+    pub label: &'static str,
+    /// Of the line, as SVG has it.
+    pub colour: &'static str,
+    /// Of the line. **Units:** px.
+    pub width: f64,
+    /// Pieces of the path on this floor.
+    pub pieces: Vec<Vec<Point>>,
+}
+
+/// Many places on a floor, a cloud of particles for instance. **Units:** m; **Frame:** building.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dots {
+    /// What they are.
+    pub label: &'static str,
+    /// As SVG has it.
+    pub colour: &'static str,
+    /// The places.
+    pub places: Vec<Point>,
+}
+
 /// Draws a floor with marks on it.
 pub fn draw(building: &Building, floor: &Floor, marks: &[Mark]) -> String {
+    draw_with(building, floor, marks, &[], &[])
+}
+
+/// Draws a floor with marks, dots and, above them, paths.
+pub fn draw_with(building: &Building, floor: &Floor, marks: &[Mark], dots: &[Dots], traces: &[Trace]) -> String {
     let mut pen = Pen::new();
     let plan = Plan::of(building, floor, marks);
     pen.text([LEFT, 40.0], &title(building, floor), TITLE);
     pen.text([LEFT, 62.0], &note(floor), NOTE);
-    key(&mut pen, building, floor);
+    let lines = traces.iter().filter(|trace| !trace.pieces.is_empty()).map(|trace| (trace.colour, trace.label));
+    let clouds = dots.iter().filter(|dots| !dots.places.is_empty()).map(|dots| (dots.colour, dots.label));
+    key(&mut pen, building, floor, &clouds.chain(lines).collect::<Vec<_>>());
     plan.grid(&mut pen);
     pen.clip("plan", [LEFT, TOP], [RIGHT - LEFT, plan.bottom - TOP]);
     plan.areas(&mut pen, building, floor);
@@ -65,6 +96,16 @@ pub fn draw(building: &Building, floor: &Floor, marks: &[Mark]) -> String {
     for entrance in building.entrances.iter().filter(|entrance| entrance.floor == floor.number) {
         let at = plan.at(entrance.place);
         pen.outline(at, &[[0.0, -9.0], [8.0, 6.0], [-8.0, 6.0]], DOOR, (PAPER, 1.0));
+    }
+    for dots in dots {
+        for place in &dots.places {
+            pen.circle(plan.at(*place), 1.6, dots.colour, (PAPER, 0.0));
+        }
+    }
+    for trace in traces {
+        for piece in &trace.pieces {
+            pen.polyline(piece.iter().map(|point| plan.at(*point)), trace.colour, trace.width, 0.9);
+        }
     }
     for mark in marks {
         plan.mark(&mut pen, mark);
@@ -90,7 +131,7 @@ fn note(floor: &Floor) -> String {
 }
 
 /// What the colours mean: only those that occur.
-fn key(pen: &mut Pen, building: &Building, floor: &Floor) {
+fn key(pen: &mut Pen, building: &Building, floor: &Floor, more: &[(&str, &str)]) {
     let on = |kinds: &[ConnectorKind]| {
         building.connectors.iter().any(|connector| {
             kinds.contains(&connector.kind) && connector.outlines.iter().any(|(number, _)| *number == floor.number)
@@ -104,7 +145,8 @@ fn key(pen: &mut Pen, building: &Building, floor: &Floor) {
         (GRAPH, "walk graph", building.graph.is_some()),
     ];
     let mut x = LEFT;
-    for (colour, word, _) in entries.iter().filter(|(_, _, occurs)| *occurs) {
+    let occurring = entries.iter().filter(|(_, _, occurs)| *occurs).map(|(colour, word, _)| (*colour, *word));
+    for (colour, word) in occurring.chain(more.iter().copied()) {
         pen.rectangle([x, 73.0], [14.0, 12.0], colour);
         pen.text([x + 20.0, 84.0], word, SMALL);
         x += 40.0 + 6.4 * word.len() as f64;

@@ -16,6 +16,7 @@ mod error;
 pub mod evaluate;
 pub mod line;
 pub mod live;
+mod located;
 pub mod parameters;
 pub mod replay;
 pub mod report;

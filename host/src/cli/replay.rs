@@ -1,5 +1,6 @@
 //! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
 
+use super::located::InBuilding;
 use super::report::{Report, Settings};
 use super::{Error, Output, convert, parameters, print};
 use crate::calibration;
@@ -12,7 +13,8 @@ use std::path::PathBuf;
     after_help = "Writes track.svg, track.png, track.geojson, steps.csv, parameters.toml and recording.mcap. A recording\n\
 that holds its truth (of 'sohle demo' or 'sohle simulate') is judged by it.\n\n\
 Examples:\n  sohle replay walk.csv --compare\n  sohle replay sohle-out/demo/recording.mcap --out again\n  \
-sohle replay walk.mcap --parameters mine.toml --origin 48.2087,16.3726,35"
+sohle replay walk.mcap --parameters mine.toml --origin 48.2087,16.3726,35\n  \
+sohle replay walk.mcap --building buildings/twin.geojson --start entrances"
 )]
 pub struct Args {
     /// The recording: MCAP of this program, or any layout that --profile can name
@@ -30,12 +32,15 @@ pub struct Args {
     #[arg(long)]
     compare: bool,
     #[command(flatten)]
+    place: InBuilding,
+    #[command(flatten)]
     output: Output,
 }
 
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args { file, profile, parameters, calibration, compare, output } = args;
+    let Args { file, profile, parameters, calibration, compare, place, output } = args;
+    let follower = place.prepare()?;
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut settings = vec![match &parameters {
         Some(path) => Settings { label: stem(path), parameters: parameters::read(path)?, ..Settings::default() },
@@ -54,7 +59,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         print(&format!("{again}\n"))?;
     }
     let folder = output.folder(&stem(&file));
-    Report {
+    let track = Report {
         title: recording.name.clone(),
         recording,
         calibration,
@@ -64,6 +69,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         quiet: output.quiet,
     }
     .run()?;
+    if let Some(follower) = follower {
+        follower.run(&track, &folder, output.quiet)?;
+    }
     match again {
         Some(again) if !again.is_whole() => Err(Error::new(format!("computed again, the steps differ: {again}"))),
         _ => Ok(()),

@@ -78,8 +78,8 @@ struct Outcome {
 }
 
 impl Report<'_> {
-    /// Does it all.
-    pub fn run(self) -> Result<(), Error> {
+    /// Does it all; returns the track of the first settings.
+    pub fn run(self) -> Result<Track, Error> {
         file::folder(self.folder)?;
         let Self { title, mut recording, calibration, settings, folder, origin, quiet } = self;
         let outcomes: Vec<_> =
@@ -110,7 +110,7 @@ impl Report<'_> {
         if !quiet {
             print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;
         }
-        Ok(())
+        Ok(outcomes.into_iter().next().map(|outcome| outcome.track).unwrap_or_default())
     }
 }
 

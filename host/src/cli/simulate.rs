@@ -1,6 +1,8 @@
 //! `sohle simulate`: a walk with the truth, as a recording.
 
 use super::{Error, print};
+use crate::building;
+use crate::building::open::{Options, open};
 use crate::recording::{self, Profile};
 use crate::simulation::gait::Gait;
 use crate::simulation::output;
@@ -18,6 +20,7 @@ use std::path::PathBuf;
     sohle simulate --gait run --person c --strides 50 --mounting x-up --out run.csv\n  \
     sohle simulate --preset endless --duration 86400 --out day.csv\n  \
     sohle simulate --preset demo --print > mine.toml; sohle simulate --scenario mine.toml --out walk.csv\n  \
+    sohle simulate --building buildings/twin.geojson --route W02,hall,stairs,E14 --out walk.mcap\n  \
     sohle simulate --describe")]
 pub struct Args {
     /// Scenario file
@@ -26,6 +29,12 @@ pub struct Args {
     /// Ready-made scenario
     #[arg(long, value_enum, conflicts_with = "gait")]
     preset: Option<Preset>,
+    /// Walks through this building: any format that 'sohle building show' takes
+    #[arg(long, value_name = "FILE|DIR", requires = "route", conflicts_with_all = ["scenario", "preset", "gait"])]
+    building: Option<PathBuf>,
+    /// The way: rooms, and between them stairs, ramp, elevator or the name of one
+    #[arg(long, value_name = "ROOM,ROOM,...", requires = "building", value_delimiter = ',')]
+    route: Vec<String>,
     /// Only this, around a rectangle of corridors or back and forth [default: the demo]
     #[arg(long, value_enum)]
     gait: Option<Motion>,
@@ -173,6 +182,7 @@ pub fn run(args: Args) -> Result<(), Error> {
 /// What the arguments ask for.
 fn scenario(args: &Args) -> Result<Scenario, Error> {
     let mut scenario = match (&args.scenario, args.preset, args.gait) {
+        _ if args.building.is_some() => in_building(args)?,
         (Some(path), ..) => {
             let text = std::fs::read_to_string(path)
                 .map_err(|error| Error::new(format!("scenario file {}: {error}", path.display())))?;
@@ -208,6 +218,15 @@ fn scenario(args: &Args) -> Result<Scenario, Error> {
     };
     scenario.check()?;
     Ok(scenario)
+}
+
+/// A walk through a building.
+fn in_building(args: &Args) -> Result<Scenario, Error> {
+    let Some(path) = &args.building else { return Ok(Scenario::default()) };
+    let building = open(path, &Options::default())?;
+    let stops: Vec<&str> = args.route.iter().map(String::as_str).collect();
+    let route = Route::through(&building, &building::route::plan(&building, &stops)?)?;
+    Ok(Scenario { route, ..Scenario::default() })
 }
 
 /// Prints the figures of every gait.

@@ -32,6 +32,7 @@ pub mod start;
 pub use ancestry::PastPlace;
 pub use areas::Outline;
 pub use cloud::Particle;
+pub use cluster::Cluster;
 pub use error::Error;
 pub use estimate::{Estimate, State};
 pub use filter::ParticleFilter;
