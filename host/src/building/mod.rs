@@ -7,6 +7,7 @@
 //! # Frame
 //! x east, y north, z up from the origin of the building, in metres. [`Georeference`] tells where that is.
 
+pub mod check;
 pub mod error;
 mod features;
 pub mod generate;

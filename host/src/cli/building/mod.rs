@@ -1,4 +1,6 @@
-//! `sohle building`: buildings are generated, converted and shown.
+//! `sohle building`: buildings are generated, converted, shown and checked.
+
+mod check;
 
 use super::table::Table;
 use super::{Error, print};
@@ -7,9 +9,10 @@ use crate::building::{Building, ConnectorKind, generate, geojson, geometry, pict
 use crate::export::{file, png};
 use std::path::{Path, PathBuf};
 
-/// Generates, converts and shows buildings
+/// Generates, converts, shows and checks buildings
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  sohle building show buildings/twin.geojson\n  \
+                        sohle building check buildings/twin.geojson\n  \
                         sohle building convert floorplans/ house.geojson\n  \
                         sohle building generate large --seed 7 large.geojson")]
 pub struct Args {
@@ -22,6 +25,7 @@ enum Command {
     Generate(GenerateArgs),
     Convert(ConvertArgs),
     Show(ShowArgs),
+    Check(check::CheckArgs),
 }
 
 /// Which building is made.
@@ -111,6 +115,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         Command::Generate(args) => generate(&args),
         Command::Convert(args) => convert(&args),
         Command::Show(args) => show(&args),
+        Command::Check(args) => check::run(&args),
     }
 }
 
