@@ -28,7 +28,7 @@ fn refused(folder: &Path, arguments: &[&str], code: i32) -> String {
 fn a_made_building_is_converted_and_shown() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path();
-    assert!(said(folder, &["generate", "twin", "twin.geojson"]).contains("35.0 x 23.0"));
+    assert!(said(folder, &["generate", "twin", "twin.geojson"]).contains("52.0 x 19.8"));
     assert!(refused(folder, &["generate", "twin", "twin.geojson"], 1).contains("--force"));
     assert!(refused(folder, &["generate", "twin", "--seed", "2", "a.geojson"], 1).contains("one 'twin' only"));
     said(folder, &["convert", "twin.geojson", "again.geojson"]);

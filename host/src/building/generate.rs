@@ -300,19 +300,34 @@ fn widths(length: f64, unit: &mut impl FnMut() -> f64) -> Vec<f64> {
     widths
 }
 
-/// Walls that lie twice on each other are drawn once.
+/// Walls that lie on each other are drawn once. All of them run along x or y.
 fn made(mut building: Building) -> Building {
     for floor in &mut building.floors {
-        let mut walls: Vec<Segment> = Vec::new();
-        for mut wall in std::mem::take(&mut floor.walls) {
+        let mut walls: Vec<Segment> = std::mem::take(&mut floor.walls);
+        for wall in &mut walls {
+            // Widths that were added up miss each other by a little.
+            *wall = wall.map(|point| point.map(|value| (value * 1e3).round() / 1e3));
             if wall[1] < wall[0] {
                 wall.swap(0, 1);
             }
-            if wall[0] != wall[1] && !walls.contains(&wall) {
-                walls.push(wall);
+        }
+        // Line by line, from one end to the other.
+        let line = |wall: &Segment| {
+            let across = usize::from(wall[0][0] != wall[1][0]);
+            (across, (wall[0][across] * 1e3).round() as i64, (wall[0][1 - across] * 1e3).round() as i64)
+        };
+        walls.retain(|wall| wall[0] != wall[1]);
+        walls.sort_by_key(line);
+        for wall in walls {
+            match floor.walls.last_mut() {
+                Some(last) if line(last).0 == line(&wall).0 && line(last).1 == line(&wall).1 && wall[0] <= last[1] => {
+                    if last[1] < wall[1] {
+                        last[1] = wall[1];
+                    }
+                }
+                _ => floor.walls.push(wall),
             }
         }
-        floor.walls = walls;
     }
     building.assembled().expect("a generated building is whole; the tests make each")
 }
