@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn sound_buildings_have_no_findings() {
         assert_eq!(kinds(house()), []);
-        for building in [generate::twin().unwrap(), generate::large(1).unwrap()] {
+        for building in [generate::twin(2), generate::large(1)] {
             assert_eq!(check(&building), []);
         }
     }
