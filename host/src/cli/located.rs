@@ -32,7 +32,7 @@ pub struct InBuilding {
     /// Follows the steps through this building: any format that 'sohle building show' takes
     #[arg(long, value_name = "FILE|DIR")]
     building: Option<PathBuf>,
-    /// Where the walk begins: anywhere, entrances, a room, or FLOOR,X,Y[,HEADING_DEG]
+    /// Where the walk begins: anywhere, entrances, a room, or FLOOR,X,Y or FLOOR,X,Y,HEADING_DEG
     ///
     /// X east and Y north in metres of the building, the heading counter-clockwise from east.
     #[arg(long, value_name = "WHERE", default_value = "anywhere", requires = "building", allow_hyphen_values = true)]

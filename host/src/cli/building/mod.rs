@@ -64,7 +64,7 @@ struct Input {
     /// Its format; recognised from the content when left out
     #[arg(long)]
     format: Option<Format>,
-    /// From floor to floor, where the format has no heights [m]
+    /// From floor to floor in metres, where the format has no heights
     #[arg(long, value_name = "M", default_value_t = Options::default().storey_m)]
     storey: f64,
 }
