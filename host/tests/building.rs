@@ -30,7 +30,7 @@ fn a_made_building_is_converted_and_shown() {
     let folder = home.path();
     assert!(said(folder, &["generate", "twin", "twin.geojson"]).contains("52.0 x 19.8"));
     assert!(refused(folder, &["generate", "twin", "twin.geojson"], 1).contains("--force"));
-    assert!(refused(folder, &["generate", "twin", "--seed", "2", "a.geojson"], 1).contains("one 'twin' only"));
+    assert!(refused(folder, &["generate", "twin", "--seed", "2", "a.geojson"], 1).contains("of 'large' only"));
     said(folder, &["convert", "twin.geojson", "again.geojson"]);
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     assert_eq!(read("twin.geojson"), read("again.geojson"));

@@ -2,7 +2,7 @@
 
 use super::suite as table;
 use super::{Error, parameters, print, progress};
-use crate::evaluation::building::suite;
+use crate::evaluation::building::{suite, unknown};
 use crate::evaluation::{Manifest, Perturbation, Report, Settings, evaluate};
 use crate::{particle, toml_file};
 use clap::ValueEnum;
@@ -114,7 +114,7 @@ fn in_pool<T: Send>(threads: Option<std::num::NonZeroUsize>, work: impl FnOnce()
 }
 
 /// Rooms of a walk from an unknown start, and of a walk of which a part is missing.
-const SHORT_STOPS: usize = 4;
+const SHORT_STOPS: usize = 6;
 const LONG_STOPS: usize = 9;
 
 fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
@@ -130,20 +130,22 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
         }
         Suite::Building => {
             let documented = particle::Parameters::documented();
-            let bar = progress(8 * args.walks as u64, "walks", false);
+            let bar = progress(2 * 8 * args.walks as u64, "walks", false);
             let done = || bar.inc(1);
-            let walks = suite::random_walks(args.walks, SHORT_STOPS, args.seed, done)?;
-            let long = suite::random_walks(args.walks, LONG_STOPS, args.seed, done)?;
-            let (mut unknown, mut lost) = (Vec::new(), Vec::new());
-            for (name, parameters) in [("documented", &documented), ("default", &default)] {
-                unknown.push(suite::unknown(name, parameters, &walks, done)?);
-                lost.extend(suite::lost(name, parameters, &long, done)?);
+            let (mut rows, mut lost) = (Vec::new(), Vec::new());
+            for site in [unknown::Site::institute()?, unknown::Site::offices()?] {
+                let walks = unknown::random_walks(&site, args.walks, SHORT_STOPS, args.seed, done)?;
+                let long = unknown::random_walks(&site, args.walks, LONG_STOPS, args.seed, done)?;
+                for (name, parameters) in [("documented", &documented), ("default", &default)] {
+                    rows.push(unknown::unknown(&site, name, parameters, &walks, done)?);
+                    lost.extend(unknown::lost(&site, name, parameters, &long, done)?);
+                }
             }
             bar.finish_and_clear();
-            let mut tables = vec![table::unknown(&unknown), table::lost(&lost)];
-            tables.extend(unknown.iter().map(table::reliability));
+            let mut tables = vec![table::unknown(&rows), table::lost(&lost)];
+            tables.extend(rows.iter().map(table::reliability));
             let text = tables.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n");
-            (text, serde_json::json!({"unknown": unknown, "lost": lost}))
+            (text, serde_json::json!({"unknown": rows, "lost": lost}))
         }
     };
     if args.format == Format::Json {

@@ -1,7 +1,8 @@
 //! The figures of the suites as tables.
 
 use super::table::Table;
-use crate::evaluation::building::suite::{Errors, KnownRow, LostRow, OtherRow, UnknownRow};
+use crate::evaluation::building::suite::{Errors, KnownRow, OtherRow};
+use crate::evaluation::building::unknown::{LostRow, UnknownRow};
 
 fn metres(errors: &Errors) -> String {
     format!("{:.3} / {:.3}", errors.mean_m, errors.worst_m)
@@ -78,6 +79,7 @@ pub fn unknown(rows: &[UnknownRow]) -> Table {
     let headings = [
         "walks",
         "located in 60 s %",
+        "in 120 s %",
         "at all %",
         "wrongly %",
         "mean m",
@@ -89,10 +91,11 @@ pub fn unknown(rows: &[UnknownRow]) -> Table {
     let mut table = Table::new("unknown start, three floors", &headings);
     for row in rows {
         table.row(
-            row.settings,
+            format!("{}, {}", row.site, row.settings),
             vec![
                 row.walks.to_string(),
                 format!("{:.1}", row.located_60_s_percent),
+                format!("{:.1}", row.located_120_s_percent),
                 format!("{:.1}", row.located_percent),
                 format!("{:.1}", row.wrongly_percent),
                 format!("{:.3}", row.located.mean_m),
@@ -108,7 +111,7 @@ pub fn unknown(rows: &[UnknownRow]) -> Table {
 
 /// How often a probability was right.
 pub fn reliability(row: &UnknownRow) -> Table {
-    let corner = format!("likeliest room, {}", row.settings);
+    let corner = format!("likeliest room, {}, {}", row.site, row.settings);
     let mut table = Table::new(corner, &["moments", "said %", "right %"]);
     for bin in &row.reliability {
         table.row(
@@ -125,7 +128,7 @@ pub fn lost(rows: &[LostRow]) -> Table {
     let mut table = Table::new("disturbance", &headings);
     for row in rows {
         table.row(
-            row.disturbance,
+            format!("{}, {}", row.site, row.disturbance),
             vec![
                 row.settings.to_owned(),
                 row.walks.to_string(),

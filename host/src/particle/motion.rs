@@ -163,7 +163,12 @@ impl Covariance {
         let place = parameters.place_sigma_m * parameters.place_sigma_m;
         let turn = parameters.turn_sigma * parameters.turn_sigma;
         let extra = Matrix4::from_diagonal(&Vector4::new(place, place, 0.0, turn));
-        let covariance = step.covariance + extra;
+        let mut covariance = step.covariance;
+        for i in 0..4 {
+            covariance[(i, 3)] *= parameters.turn_share;
+            covariance[(3, i)] *= parameters.turn_share;
+        }
+        let covariance = covariance + extra;
         // A covariance that is none (a step made by hand) leaves what its diagonal says.
         let root = covariance.cholesky().map_or_else(
             || Matrix4::from_diagonal(&covariance.diagonal().map(|value| value.max(0.0).sqrt())),

@@ -25,6 +25,9 @@ pub struct Parameters {
     pub spacing_m: f32,
     /// Unknown start: headings at each place (16).
     pub headings: u32,
+    /// Unknown start: 0 holds every square metre for as likely as any other, 1 every room; between them the exponent of its area
+    /// counts as much less.
+    pub room_prior: f32,
     /// Most particles; places are further apart in a building that would need more.
     pub most: usize,
     /// Fewest particles (N0; 501).
@@ -46,6 +49,8 @@ pub struct Parameters {
     pub place_sigma_m: f32,
     /// Turn: the same.
     pub turn_sigma: f32,
+    /// Turn: the share of its own standard deviation that counts.
+    pub turn_share: f32,
     /// Step scale at the start (standard deviation of a factor).
     pub scale_sigma: f32,
     /// Step scale: its change from step to step.
@@ -78,23 +83,25 @@ impl Default for Parameters {
             method: Method::Covariance,
             spacing_m: 0.3,
             headings: 16,
+            room_prior: 0.5,
             most: 500_000,
-            least: 2_000,
+            least: 4_000,
             phi: [0.02, 0.01, 0.02],
             psi: [1e-4, 1e-4, 4e-4],
             phi_z_m: 0.1,
             cluster_m: [5.0, 1.0],
             cluster_most: 10_000,
             place_sigma_m: 0.02,
-            turn_sigma: 0.3_f32.to_radians(),
+            turn_sigma: 0.2_f32.to_radians(),
+            turn_share: 0.5,
             scale_sigma: 0.01,
             scale_noise: 0.001,
             level_sigma_m: 0.08,
             exit_sigma_m: 0.3,
             leak: 1e-3,
-            kld_error: 0.05,
+            kld_error: 0.02,
             resample_below: 0.7,
-            roughening: 0.5,
+            roughening: 1.0,
             lost_odds: 9.0,
             located_share: 0.98,
             located_sigma_m: 1.0,
@@ -106,7 +113,14 @@ impl Default for Parameters {
 impl Parameters {
     /// The settings of the document. Of its noise it gives the form but no figures; these are the project's.
     pub fn documented() -> Self {
-        Self { method: Method::Documented, least: 501, most: 2_000_000, scale_sigma: 0.0, ..Self::default() }
+        Self {
+            method: Method::Documented,
+            least: 501,
+            most: 2_000_000,
+            room_prior: 0.0,
+            scale_sigma: 0.0,
+            ..Self::default()
+        }
     }
 
     /// # Errors
@@ -118,6 +132,7 @@ impl Parameters {
         };
         between("spacing_m", p.spacing_m, 0.05, 10.0)?;
         between("headings", p.headings as f32, 1.0, 360.0)?;
+        between("room_prior", p.room_prior, 0.0, 1.0)?;
         between("least", p.least as f32, 10.0, 1e6)?;
         between("most", p.most as f32, p.least as f32, 1e7)?;
         for (index, name) in ["phi", "phi (height)", "phi (turn)"].into_iter().enumerate() {
@@ -131,6 +146,7 @@ impl Parameters {
         between("cluster_m (height)", p.cluster_m[1], 0.1, 100.0)?;
         between("place_sigma_m", p.place_sigma_m, 0.0, 10.0)?;
         between("turn_sigma", p.turn_sigma, 0.0, 3.0)?;
+        between("turn_share", p.turn_share, 0.0, 10.0)?;
         between("scale_sigma", p.scale_sigma, 0.0, 0.5)?;
         between("scale_noise", p.scale_noise, 0.0, 0.5)?;
         between("level_sigma_m", p.level_sigma_m, 1e-3, 10.0)?;

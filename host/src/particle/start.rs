@@ -128,7 +128,29 @@ pub(super) fn everywhere(map: &Map, parameters: &Parameters, patch: Option<Patch
             particles.push(particle(map, floor, at, heading, parameters, stream));
         }
     }
+    if parameters.room_prior > 0.0 {
+        favour_small_rooms(&mut particles, map, parameters.room_prior);
+    }
     Seeded { particles, half_spacing_m, half_sector }
+}
+
+/// People are in rooms, not in square metres: lets the weight of a room grow less than its area.
+fn favour_small_rooms(particles: &mut [Particle], map: &Map, exponent: f32) {
+    let room = |particle: &Particle| {
+        let floor = usize::from(particle.floor);
+        map.room(floor, [particle.x, particle.y]).map(|room| (floor, usize::from(room)))
+    };
+    let mut counts: Vec<Vec<u32>> = map.floors.iter().map(|floor| vec![0; floor.rooms.outlines().len()]).collect();
+    let rooms: Vec<_> = particles.iter().map(room).collect();
+    for &(floor, room) in rooms.iter().flatten() {
+        counts[floor][room] += 1;
+    }
+    let held: Vec<f32> = counts.iter().flatten().filter(|&&count| count > 0).map(|&count| count as f32).collect();
+    let mean = held.iter().sum::<f32>() / held.len().max(1) as f32;
+    for (particle, room) in particles.iter_mut().zip(rooms) {
+        // What belongs to no room counts as one of middling size.
+        particle.weight = room.map_or(1.0, |(floor, room)| (mean / counts[floor][room] as f32).powf(exponent));
+    }
 }
 
 fn places(map: &Map, spacing: f32, patch: Option<Patch>) -> Vec<(usize, [f32; 2])> {

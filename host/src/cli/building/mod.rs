@@ -33,6 +33,8 @@ enum Command {
 enum Made {
     /// Two floors of 805 m², two wings that mirror each other, two staircases, an elevator, a hall
     Twin,
+    /// Three floors of 860 m² that differ: foyer and lecture hall, offices, laboratories
+    Institute,
     /// Six floors of 10 000 m² with some sixteen hundred rooms, from a seed
     Large,
 }
@@ -122,7 +124,10 @@ pub fn run(args: Args) -> Result<(), Error> {
 fn generate(args: &GenerateArgs) -> Result<(), Error> {
     let building = match (args.made, args.seed) {
         (Made::Twin, None) => generate::twin(2),
-        (Made::Twin, Some(_)) => return Err(Error::new("--seed: there is one 'twin' only; 'large' has seeds")),
+        (Made::Institute, None) => generate::institute(),
+        (Made::Twin | Made::Institute, Some(_)) => {
+            return Err(Error::new("--seed: of 'large' only; the others are always the same"));
+        }
         (Made::Large, seed) => generate::large(seed.unwrap_or(1)),
     };
     write(&building, &args.output, args.force)

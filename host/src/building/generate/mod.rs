@@ -1,144 +1,16 @@
-//! Buildings made for evaluation: a twin of the document's, and a large one.
+//! Buildings made for evaluation: a twin of the document's, an institute whose floors differ, offices that are much alike,
+//! and a large one.
 
-use super::geometry::{Outline, Point, Segment};
-use super::model::{Building, Connector, ConnectorKind, Door, Entrance, Floor, Room};
+mod drawing;
+mod institute;
+
+pub use institute::institute;
+
+use self::drawing::{Drawing, STAIRS_M, Side, elevator, stairs};
+use super::geometry::Segment;
+use super::model::{Building, Entrance};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::Rng;
-
-/// Width of a door. **Units:** m.
-const DOOR_M: f64 = 1.0;
-/// Floor to floor: 20 risers of 0.18 m. **Units:** m.
-const STOREY_M: f64 = 3.6;
-/// Width and depth of a staircase. **Units:** m.
-const STAIRS_M: [f64; 2] = [4.0, 6.0];
-/// Length of a flight: ten treads of 0.28 m. **Units:** m.
-const FLIGHT_M: f64 = 2.8;
-
-fn rectangle([x, y]: Point, [far_x, far_y]: Point) -> Outline {
-    vec![[x, y], [far_x, y], [far_x, far_y], [x, far_y]]
-}
-
-/// A floor that is being drawn.
-struct Drawing {
-    floor: Floor,
-}
-
-impl Drawing {
-    fn new(number: i32) -> Self {
-        let name = format!("F{number}");
-        Self { floor: Floor { number, name, height_m: STOREY_M * f64::from(number), ..Floor::default() } }
-    }
-
-    fn wall(&mut self, a: Point, b: Point) {
-        self.floor.walls.push([a, b]);
-    }
-
-    /// A wall along x or y with gaps in it: middle and width of each, in order. `doors` closes them.
-    fn wall_with_gaps(&mut self, a: Point, b: Point, gaps: &[(f64, f64)], doors: bool) {
-        let axis = usize::from(a[0] == b[0]);
-        let at = |place: f64| if axis == 0 { [place, a[1]] } else { [a[0], place] };
-        let mut from = a[axis];
-        for &(middle, width) in gaps {
-            let (low, high) = (middle - width / 2.0, middle + width / 2.0);
-            self.wall(at(from), at(low));
-            if doors {
-                self.floor.doors.push(Door { line: [at(low), at(high)], name: None });
-            }
-            from = high;
-        }
-        self.wall(at(from), at(b[axis]));
-    }
-
-    fn room(&mut self, name: impl Into<String>, usage: &str, low: Point, high: Point) {
-        self.floor.rooms.push(Room { name: name.into(), usage: Some(usage.to_owned()), outline: rectangle(low, high) });
-    }
-
-    /// Rooms side by side from x = `from` on, `widths` wide, between the `corridor` and the `outer` wall, each with a door to
-    /// the corridor.
-    fn row(&mut self, from: f64, widths: &[f64], corridor: f64, outer: f64, mut name: impl FnMut(usize) -> String) {
-        let mut west = from;
-        let mut doors = Vec::new();
-        for (index, width) in widths.iter().enumerate() {
-            let east = west + width;
-            self.room(name(index), "office", [west, corridor.min(outer)], [east, corridor.max(outer)]);
-            if index > 0 {
-                self.wall([west, corridor], [west, outer]);
-            }
-            // Not in the middle: where it is tells the rooms apart.
-            doors.push((west + 0.35 * width, DOOR_M));
-            west = east;
-        }
-        self.wall([from, corridor], [from, outer]);
-        self.wall([west, corridor], [west, outer]);
-        self.wall([from, outer], [west, outer]);
-        self.wall_with_gaps([from, corridor], [west, corridor], &doors, true);
-    }
-
-    /// A staircase north of the corridor at y = `corridor`, from x = `west` on: open to the corridor, two flights with a wall
-    /// between them. `ends` says whether it ends on the lowest and on the highest floor: there nobody gets under or over
-    /// the flight.
-    fn staircase(&mut self, west: f64, corridor: f64, lowest: bool, highest: bool) {
-        let [width, depth] = STAIRS_M;
-        let (east, north, middle) = (west + width, corridor + depth, west + width / 2.0);
-        let (front, back) = flights(corridor);
-        self.wall([west, corridor], [west, north]);
-        self.wall([east, corridor], [east, north]);
-        self.wall([west, north], [east, north]);
-        self.wall_with_gaps([west, corridor], [east, corridor], &[(middle, 3.0)], false);
-        self.wall([middle, front], [middle, back]);
-        if lowest {
-            self.wall([west, front], [middle, front]);
-        }
-        if highest {
-            self.wall([middle, front], [east, front]);
-        }
-    }
-
-    /// An elevator with its door to the east.
-    fn elevator(&mut self, low: Point, high: Point) {
-        self.wall(low, [high[0], low[1]]);
-        self.wall([low[0], high[1]], high);
-        self.wall(low, [low[0], high[1]]);
-        self.wall_with_gaps([high[0], low[1]], high, &[((low[1] + high[1]) / 2.0, DOOR_M)], true);
-    }
-}
-
-/// Where the flights of a staircase begin and end, from the wall of the corridor.
-fn flights(corridor: f64) -> (f64, f64) {
-    let front = corridor + 1.4;
-    (front, front + FLIGHT_M)
-}
-
-/// The staircase of [`Drawing::staircase`] as a connector of floors 0 to `floors` - 1.
-fn stairs(name: &str, west: f64, corridor: f64, floors: i32) -> Connector {
-    let [width, depth] = STAIRS_M;
-    let outline = rectangle([west, corridor], [west + width, corridor + depth]);
-    let (front, back) = flights(corridor);
-    let (up, down) = (west + 0.75 * width, west + 0.25 * width);
-    let landing = back + 0.9;
-    let mut way = Vec::new();
-    for floor in 0..floors - 1 {
-        let low = STOREY_M * f64::from(floor);
-        let half = low + STOREY_M / 2.0;
-        way.extend([
-            [up, front - 0.5, low],
-            [up, front, low],
-            [up, back, half],
-            [up, landing, half],
-            [down, landing, half],
-            [down, back, half],
-            [down, front, low + STOREY_M],
-            [down, front - 0.5, low + STOREY_M],
-        ]);
-    }
-    let outlines = (0..floors).map(|floor| (floor, outline.clone())).collect();
-    Connector { name: name.to_owned(), kind: ConnectorKind::Stairs, outlines, way }
-}
-
-fn elevator(name: &str, low: Point, high: Point, floors: i32) -> Connector {
-    let outlines = (0..floors).map(|floor| (floor, rectangle(low, high))).collect();
-    Connector { name: name.to_owned(), kind: ConnectorKind::Elevator, outlines, way: Vec::new() }
-}
 
 /// What the evaluation of the document needs (Foot, chapter 7): two floors of 805 m² (141 120 particles each), wings that are
 /// mirror images of each other, a staircase in each, an elevator, and a hall in the middle. More floors are like the upper
@@ -164,7 +36,7 @@ pub fn twin(floors: i32) -> Building {
         drawing.row(0.0, &north, NORTH, DEEP, name("W", 6));
         drawing.row(east + STAIRS_M[0], &north_mirrored, NORTH, DEEP, name("E", 6));
         for west in [WING - STAIRS_M[0], east] {
-            drawing.staircase(west, NORTH, number == 0, number == floors - 1);
+            drawing.staircase(west, NORTH, number == 0, number == floors - 1, Side::East);
         }
         drawing.room(format!("corridor-W{number}"), "corridor", [0.0, SOUTH], [WING, NORTH]);
         drawing.room(format!("corridor-E{number}"), "corridor", [east, SOUTH], [whole, NORTH]);
@@ -193,8 +65,8 @@ pub fn twin(floors: i32) -> Building {
         name: "Twin".to_owned(),
         floors: (0..floors).map(floor).collect(),
         connectors: vec![
-            stairs("stairs-W", WING - STAIRS_M[0], NORTH, floors),
-            stairs("stairs-E", east, NORTH, floors),
+            stairs("stairs-W", WING - STAIRS_M[0], NORTH, floors, Side::East),
+            stairs("stairs-E", east, NORTH, floors, Side::East),
             elevator("elevator-1", cabin.0, cabin.1, floors),
         ],
         entrances: vec![Entrance { name: "main".to_owned(), floor: 0, place: [WING + HALL / 2.0, 0.3] }],
@@ -236,10 +108,10 @@ pub fn offices(name: &str, floors_wanted: i32, strips: usize, long: f64, seed: u
                     if row == "N" && with_stairs {
                         if side == "W" {
                             east -= STAIRS_M[0];
-                            drawing.staircase(east, high, number == 0, number == floors_wanted - 1);
+                            drawing.staircase(east, high, number == 0, number == floors_wanted - 1, Side::East);
                             drawing.wall([east, high + STAIRS_M[1]], [east, outer]);
                         } else {
-                            drawing.staircase(west, high, number == 0, number == floors_wanted - 1);
+                            drawing.staircase(west, high, number == 0, number == floors_wanted - 1, Side::East);
                             west += STAIRS_M[0];
                             drawing.wall([west, high + STAIRS_M[1]], [west, outer]);
                         }
@@ -276,8 +148,14 @@ pub fn offices(name: &str, floors_wanted: i32, strips: usize, long: f64, seed: u
     let mut connectors = Vec::new();
     for &south in &ends {
         let strip = (south / STRIP).round() as usize + 1;
-        connectors.push(stairs(&format!("stairs-{strip}W"), across[0] - STAIRS_M[0], south + north, floors_wanted));
-        connectors.push(stairs(&format!("stairs-{strip}E"), across[1], south + north, floors_wanted));
+        connectors.push(stairs(
+            &format!("stairs-{strip}W"),
+            across[0] - STAIRS_M[0],
+            south + north,
+            floors_wanted,
+            Side::East,
+        ));
+        connectors.push(stairs(&format!("stairs-{strip}E"), across[1], south + north, floors_wanted, Side::East));
     }
     for (index, (low, high)) in cabins.into_iter().enumerate() {
         connectors.push(elevator(&format!("elevator-{}", index + 1), low, high, floors_wanted));
@@ -334,6 +212,7 @@ fn made(mut building: Building) -> Building {
 
 #[cfg(test)]
 mod tests {
+    use super::super::geometry::Point;
     use super::*;
     use crate::particle::Map;
 
@@ -362,8 +241,9 @@ mod tests {
     #[test]
     fn the_committed_files_are_what_is_generated() {
         let committed = [
-            (twin(2), include_str!("../../../buildings/twin.geojson")),
-            (large(1), include_str!("../../../buildings/large.geojson")),
+            (twin(2), include_str!("../../../../buildings/twin.geojson")),
+            (institute(), include_str!("../../../../buildings/institute.geojson")),
+            (large(1), include_str!("../../../../buildings/large.geojson")),
         ];
         for (building, text) in committed {
             assert!(
