@@ -115,7 +115,7 @@ fn in_pool<T: Send>(threads: Option<std::num::NonZeroUsize>, work: impl FnOnce()
 
 /// Rooms of a walk from an unknown start, and of a walk of which a part is missing.
 const SHORT_STOPS: usize = 6;
-const LONG_STOPS: usize = 9;
+const LONG_STOPS: usize = 12;
 
 fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
     let default = match &args.particle {

@@ -38,10 +38,12 @@ const FASTEST_M_S: f32 = 1.8;
 const LONGEST_STEP_M: f32 = 2.0;
 /// Somebody who is lost is looked for this far around at first. **Units:** m.
 const LOST_RADIUS_M: f32 = 15.0;
-/// Part of the weight that stays with what was believed when it counts as lost, and part that goes to the surroundings; the
-/// rest goes to everywhere.
-const BELIEVED_PART: f32 = 0.2;
-const AROUND_PART: f32 = 0.4;
+/// Part of the weight that stays with what was believed when it counts as lost, and of the rest the part that goes to the
+/// surroundings; what is left goes to everywhere.
+const BELIEVED_PART: f32 = 0.1;
+const AROUND_PART: f32 = 0.8;
+/// Most steps that are gone through again when somebody counts as lost.
+const MOST_AGAIN: usize = 16;
 
 /// Follows a person in a building.
 #[derive(Clone, Debug)]
@@ -63,6 +65,9 @@ pub struct ParticleFilter {
     spread: Spread,
     /// Logarithm of the odds against the cloud, never below 0.
     against: f64,
+    /// The steps since these odds were last 0, and where the person was then.
+    doubtful: Vec<Step>,
+    undoubted: Vec<Cluster>,
     /// Steps in a row for which the place was clear.
     clear_steps: u32,
     estimate: Estimate,
@@ -117,6 +122,8 @@ impl ParticleFilter {
             spread: Spread::of(&seeded),
             particles: seeded.particles,
             against: 0.0,
+            doubtful: Vec::new(),
+            undoubted: Vec::new(),
             clear_steps: 0,
             estimate: Estimate::default(),
         };
@@ -137,13 +144,12 @@ impl ParticleFilter {
             self.bridge(step);
         }
         self.previous = Some((step.index, step.stance_end));
-        let moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
+        let mut moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
         let likelihood = moved.likelihood();
         let parents = if documented {
             self.draw_documented(&moved)
         } else {
-            self.judge(likelihood);
-            self.draw(&moved)
+            if self.judge(likelihood, step) { self.search_anew(&mut moved) } else { self.draw(&moved) }
         };
         self.remember(parents.as_deref(), step.index);
         let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
@@ -165,33 +171,55 @@ impl ParticleFilter {
             return;
         };
         // What a few metres hide, the noise of a few steps finds again; but the heading is gone as well.
-        self.sow_around(radius.max(2.0 * LONGEST_STEP_M), 0.0);
+        let leaders = self.estimate.clusters.clone();
+        self.sow_around(&leaders, radius.max(2.0 * LONGEST_STEP_M));
         self.against = 0.0;
+        self.doubtful.clear();
     }
 
-    /// Whether the steps still fit the building from where the cloud is.
-    fn judge(&mut self, likelihood: f64) {
+    /// Whether the steps no longer fit the building from where the cloud is.
+    fn judge(&mut self, likelihood: f64, step: &Step) -> bool {
         let odds = (ANYWHERE_LIKELIHOOD / likelihood.max(f64::MIN_POSITIVE)).ln();
         self.against = (self.against + odds).max(0.0);
-        // Whoever searches everywhere cannot be lost.
-        let searching = self.estimate.state == State::Searching;
-        if self.against > f64::from(self.parameters.lost_odds) && !searching {
-            self.against = 0.0;
-            self.clear_steps = 0;
-            self.estimate.state = State::Lost;
-            self.sow_around(LOST_RADIUS_M, BELIEVED_PART);
+        if self.against == 0.0 || self.doubtful.is_empty() {
+            self.doubtful.clear();
+            self.undoubted.clone_from(&self.estimate.clusters);
         }
+        self.doubtful.push(*step);
+        // Whoever searches everywhere cannot be lost.
+        self.against > f64::from(self.parameters.lost_odds) && self.estimate.state != State::Searching
     }
 
-    /// Sows new particles around the likeliest places and, thinly, everywhere; the old ones keep the part `believed`.
-    fn sow_around(&mut self, radius: f32, believed: f32) {
+    /// Looks for the person around where they were before the steps became doubtful, and goes through these steps again.
+    fn search_anew(&mut self, moved: &mut Moved) -> Option<Vec<usize>> {
+        self.against = 0.0;
+        self.clear_steps = 0;
+        self.estimate.state = State::Lost;
+        let mut steps = std::mem::take(&mut self.doubtful);
+        let leaders = std::mem::take(&mut self.undoubted);
+        // The cloud that is believed is here already.
+        let believed = std::mem::take(&mut self.particles);
+        steps.drain(..steps.len().saturating_sub(MOST_AGAIN));
+        self.sow_around(&leaders, LOST_RADIUS_M);
+        for step in &steps {
+            self.number += 1;
+            *moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
+            self.draw(moved);
+        }
+        let count = self.particles.len();
+        weigh(&mut self.particles, (1.0 - BELIEVED_PART) * count as f32);
+        self.particles.extend(believed);
+        weigh(&mut self.particles[count..], BELIEVED_PART * count as f32);
+        None
+    }
+
+    /// Sows new particles around the likeliest of `leaders` and, thinly, everywhere, in place of all there were.
+    fn sow_around(&mut self, leaders: &[Cluster], radius: f32) {
         let mut stream = Stream::new(self.seed, Purpose::Recover, self.number, 0);
-        let total: f64 = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
         let mut parameters = self.parameters.clone();
         parameters.most /= 2;
         let mut around = Vec::new();
-        let leaders: Vec<Cluster> = self.estimate.clusters.iter().take(3).cloned().collect();
-        for leader in leaders.iter().filter(|leader| leader.probability > 0.1) {
+        for leader in leaders.iter().take(3).filter(|leader| leader.probability > 0.1) {
             let patch = Patch {
                 floor: leader.floor_index,
                 centre: [leader.position.x as f32, leader.position.y as f32],
@@ -201,23 +229,19 @@ impl ParticleFilter {
         }
         let everywhere = start::everywhere(&self.map, &parameters, None, &mut stream);
         let mut spread = Spread::of(&everywhere);
-        if total > 0.0 && believed > 0.0 {
-            weigh(&mut self.particles, believed);
-        } else {
-            self.particles.clear();
-        }
-        let mut sown = everywhere.particles;
-        weigh(&mut sown, 1.0 - AROUND_PART - believed);
-        weigh(&mut around, AROUND_PART);
         // Who was sown has no forebears: what is known of the past will not become better.
         self.settled = self.past();
         self.ancestry.clear();
-        self.particles.append(&mut around);
-        self.particles.append(&mut sown);
+        self.particles = everywhere.particles;
+        if !around.is_empty() {
+            weigh(&mut self.particles, 1.0 - AROUND_PART);
+            weigh(&mut around, AROUND_PART);
+            self.particles.append(&mut around);
+        }
         // Weights near 1 on average, as after drawing.
-        let count = self.particles.len() as f32;
-        self.particles.iter_mut().for_each(|particle| particle.weight *= count);
-        spread.sown = self.particles.len();
+        let count = self.particles.len();
+        weigh(&mut self.particles, count as f32);
+        spread.sown = count;
         self.spread = spread;
     }
 

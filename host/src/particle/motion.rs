@@ -267,7 +267,7 @@ mod tests {
     }
 
     fn exact() -> Parameters {
-        Parameters { place_sigma_m: 0.0, turn_sigma: 0.0, scale_noise: 0.0, ..Parameters::default() }
+        Parameters { place_sigma_m: 0.0, turn_sigma: 0.0, turn_share: 1.0, scale_noise: 0.0, ..Parameters::default() }
     }
 
     #[test]

@@ -16,6 +16,9 @@ use std::sync::Arc;
 /// A place is wrong when it is further from the truth than this. **Units:** m.
 pub const WRONG_M: f64 = 3.0;
 
+/// How long a walk must go on after a disturbance. **Units:** us.
+const LEFT_US: i64 = 75_000_000;
+
 /// Where walks take place.
 #[derive(Clone, Debug)]
 pub struct Site {
@@ -270,14 +273,18 @@ fn off(height: f32, z: f64) -> f64 {
     (f64::from(height) - z).abs()
 }
 
+/// Nothing when too little is left of a walk after this step.
+fn enough(walk: &Walk, from: usize) -> Option<()> {
+    let end = walk.steps.last()?.stance_end.0;
+    (end - walk.steps[from].stance_end.0 > LEFT_US).then_some(())
+}
+
 /// The steps of 10 m in the middle are not told, and the index says nothing of it.
 fn teleported(walk: &Walk) -> Option<(Vec<Step>, Vec<Vector3<f64>>, usize)> {
     let from = walk.steps.len() / 3;
     let gone = |to: usize| (walk.truth[to] - walk.truth[from]).norm();
     let to = (from..walk.steps.len()).find(|&to| gone(to) > 10.0)?;
-    if walk.steps.len() - to < 20 {
-        return None;
-    }
+    enough(walk, to)?;
     let (mut steps, mut truth) = (walk.steps[..=from].to_vec(), walk.truth[..=from].to_vec());
     for (step, place) in walk.steps[to + 1..].iter().zip(&walk.truth[to + 1..]) {
         steps.push(Step { index: step.index - (to - from) as u32, ..*step });
@@ -286,14 +293,12 @@ fn teleported(walk: &Walk) -> Option<(Vec<Step>, Vec<Vector3<f64>>, usize)> {
     Some((steps, truth, from + 1))
 }
 
-/// Two minutes in the middle are not told; the index shows it. What is left of a short walk is repeated after it.
+/// Two minutes in the middle are not told; the index shows it.
 fn holed(walk: &Walk) -> Option<(Vec<Step>, Vec<Vector3<f64>>, usize)> {
     let from = walk.steps.len() / 4;
     let end = walk.steps[from].stance_end.0 + 120_000_000;
     let to = (from..walk.steps.len()).find(|&to| walk.steps[to].stance_end.0 > end)?;
-    if walk.steps.len() - to < 30 {
-        return None;
-    }
+    enough(walk, to)?;
     let keep = |range: std::ops::Range<usize>| (walk.steps[range.clone()].to_vec(), walk.truth[range].to_vec());
     let ((mut steps, mut truth), (later, places)) = (keep(0..from + 1), keep(to..walk.steps.len()));
     steps.extend(later);
