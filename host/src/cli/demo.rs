@@ -42,6 +42,6 @@ pub fn run(args: Args) -> Result<(), Error> {
     let recording = recording::open(&path, None)?;
     let settings = vec![Settings::default(), Settings::documented()];
     let title = format!("A simulated walk with stairs, seed {seed}");
-    Report { title, recording, calibration: None, settings, folder: &folder, origin, quiet }.run()?;
+    Report { title, recording, calibration: None, settings, folder: &folder, origin, following: None, quiet }.run()?;
     Ok(())
 }

@@ -40,7 +40,7 @@ pub struct Args {
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
     let Args { file, profile, parameters, calibration, compare, place, output } = args;
-    let follower = place.prepare()?;
+    let mut following = place.prepare()?;
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut settings = vec![match &parameters {
         Some(path) => Settings { label: stem(path), parameters: parameters::read(path)?, ..Settings::default() },
@@ -59,18 +59,19 @@ pub fn run(args: Args) -> Result<(), Error> {
         print(&format!("{again}\n"))?;
     }
     let folder = output.folder(&stem(&file));
-    let track = Report {
+    let recording = Report {
         title: recording.name.clone(),
         recording,
         calibration,
         settings,
         folder: &folder,
         origin: output.origin,
+        following: following.as_mut(),
         quiet: output.quiet,
     }
     .run()?;
-    if let Some(follower) = follower {
-        follower.run(&track, &folder, output.quiet)?;
+    if let Some(following) = following {
+        following.finish(&recording, &folder, output.quiet)?;
     }
     match again {
         Some(again) if !again.is_whole() => Err(Error::new(format!("computed again, the steps differ: {again}"))),

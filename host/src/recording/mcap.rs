@@ -559,6 +559,7 @@ mod tests {
             }),
             steps: vec![step(0), step(1)],
             again: None,
+            orders: Vec::new(),
             metadata: BTreeMap::from([("parameters".to_owned(), "gain = 0.1\n[stance]\n".to_owned())]),
         }
     }
