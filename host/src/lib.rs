@@ -11,6 +11,7 @@ pub mod link;
 pub mod particle;
 pub mod phone;
 pub mod recording;
+pub mod serve;
 pub mod simulation;
 pub mod toml_file;
 pub mod track;

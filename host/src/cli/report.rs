@@ -11,6 +11,7 @@ use crate::evaluation::{Metric, Metrics};
 use crate::export::geojson::Origin;
 use crate::export::picture::{Dot, Line, Picture, Placement, Role};
 use crate::export::{self, Named, file};
+use crate::recording::live::BEGAN;
 use crate::recording::{Recording, SimulatedTruth, mcap};
 use crate::track::{Steer, Track};
 use indicatif::ProgressIterator;
@@ -137,8 +138,9 @@ fn outcome(
     let bar = progress(recording.samples.len() as u64, &format!("tracking ({})", settings.label), quiet);
     let begun = Instant::now();
     let correct = |sample: &ImuSample| calibration.map_or(*sample, |calibration| calibration.apply(sample, None));
-    let mut steering =
-        Steering { orders: &recording.orders, following, mode: None, wanted: recording.orders.is_empty() };
+    let began_us = recording.metadata.get(BEGAN).and_then(|text| text.parse().ok());
+    let (orders, wanted) = (&recording.orders[..], recording.orders.is_empty());
+    let mut steering = Steering { orders, following, mode: None, wanted, began_us };
     let track = if recording.samples.is_empty() {
         recording.steps.iter().for_each(|step| _ = steering.after(step));
         Track::of_steps(&recording.steps)
@@ -159,6 +161,8 @@ struct Steering<'a> {
     mode: Option<FloorMode>,
     /// What the building asks for is done.
     wanted: bool,
+    /// When the time of the recording was zero, if it knows its date. **Units:** microseconds since the beginning of 1970.
+    began_us: Option<i64>,
 }
 
 impl Steer for Steering<'_> {
@@ -170,7 +174,7 @@ impl Steer for Steering<'_> {
     }
 
     fn after(&mut self, step: &Step) -> Option<Order> {
-        let mode = self.following.as_mut()?.step(step).mode;
+        let mode = self.following.as_mut()?.step(step, self.began_us.map(|began| began + step.stance_end.0)).0.mode;
         let changed = mode != std::mem::replace(&mut self.mode, mode);
         (changed && self.wanted).then_some(Order::FloorMode(mode))
     }

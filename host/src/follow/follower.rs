@@ -179,6 +179,11 @@ impl Follower {
         self.modes.mode()
     }
 
+    /// Whether the shoe is to be told its floor mode.
+    pub fn steers(&self) -> bool {
+        self.modes.steers()
+    }
+
     /// What one should know before trusting the places: a building that tells little.
     pub fn warnings(&self) -> Vec<String> {
         let bare: Vec<_> = self.building.floors.iter().filter(|floor| floor.walls.is_empty()).collect();

@@ -13,6 +13,6 @@ mod start;
 
 pub use error::Error;
 pub use follower::{Followed, Follower, LONGEST_STEP_M, Said, Settings, Unusual};
-pub use json::line;
+pub use json::{line, mode_word};
 pub use modes::{FloorModes, Shares, Steering};
 pub use start::parse as parse_start;

@@ -50,6 +50,11 @@ impl FloorModes {
         Self { steering, ..Self::default() }
     }
 
+    /// Whether the shoe is told anything at all.
+    pub fn steers(&self) -> bool {
+        self.steering != Steering::Off
+    }
+
     /// The mode wanted now; `None` leaves it to the shoe.
     pub fn mode(&self) -> Option<FloorMode> {
         self.mode

@@ -21,6 +21,8 @@ use std::fmt;
 
 /// Metadata in which the parameters of the shoe are kept.
 pub const PARAMETERS: &str = "parameters";
+/// Metadata in which is kept when the clock of the shoe was zero: microseconds since the beginning of 1970.
+pub const BEGAN: &str = "began_unix_us";
 /// Metadata in which the calibration of the shoe is kept.
 pub const CALIBRATION: &str = "calibration";
 

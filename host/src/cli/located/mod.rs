@@ -1,10 +1,12 @@
 //! What `replay`, `demo` and `live` do with a building: somebody is followed through it, and it is told, drawn and written.
 
 mod following;
+mod outputs;
 mod picture;
 mod summary;
 
-pub use following::Following;
+pub use following::{Following, finish_and_tell};
+pub use outputs::Wanted;
 
 use super::Error;
 use crate::building::Building;
@@ -40,6 +42,8 @@ pub struct How {
     /// What the map tells the tracker of the ground [default: document]
     #[arg(long, value_enum, value_name = "WHAT")]
     floor_mode: Option<Steering>,
+    #[command(flatten)]
+    pub wanted: Wanted,
 }
 
 impl InBuilding {
@@ -54,13 +58,21 @@ impl InBuilding {
 }
 
 impl How {
+    /// Whether the walk begins at a known place.
+    pub fn starts_somewhere(&self) -> bool {
+        self.start.as_ref().is_some_and(|start| start.trim() != "anywhere")
+    }
+
     /// An option that was given.
-    pub fn given(&self) -> Option<&'static str> {
+    fn given(&self) -> Option<&'static str> {
         let given = [
             ("--start", self.start.is_some()),
             ("--particle", self.particle.is_some()),
             ("--particle-seed", self.particle_seed.is_some()),
             ("--floor-mode", self.floor_mode.is_some()),
+            ("--track", !self.wanted.track.is_empty()),
+            ("--places", self.wanted.places.is_some()),
+            ("--serve", self.wanted.serve.is_some()),
         ];
         given.iter().find(|(_, given)| *given).map(|(option, _)| *option)
     }
@@ -81,6 +93,6 @@ impl How {
         for warning in follower.warnings() {
             eprintln!("warning: {warning}");
         }
-        Following::new(follower)
+        Following::new(follower, &self.wanted)
     }
 }
