@@ -40,7 +40,7 @@ pub struct Args {
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
     let Args { file, profile, parameters, calibration, compare, place, output } = args;
-    let mut following = place.prepare()?.map(Following::keeping_lines);
+    let mut following = place.prepare()?.map(Following::keeping_all);
     let quiet = output.quiet || place.how.wanted.takes_stdout();
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut settings = vec![match &parameters {

@@ -88,7 +88,10 @@ impl Report<'_> {
         let Self { title, mut recording, calibration, settings, folder, origin, mut following, quiet } = self;
         let mut outcomes = Vec::new();
         for settings in settings {
-            outcomes.push(outcome(&recording, calibration.as_ref(), settings, following.take(), quiet));
+            outcomes.push({
+                let first = outcomes.is_empty();
+                outcome(&recording, calibration.as_ref(), settings, following.as_deref_mut().filter(|_| first), quiet)
+            });
         }
         let table = table(&recording, &outcomes);
         let picture = picture(title, note(&recording, calibration.as_ref(), &outcomes), &recording, &outcomes, &table);
@@ -111,7 +114,8 @@ impl Report<'_> {
             files.push(CALIBRATION.to_owned());
             recording.metadata.insert("calibration".into(), text);
         }
-        mcap::write(&folder.join(RECORDING), &recording)?;
+        let (building, moments) = following.as_ref().map(|following| following.shown()).unwrap_or_default();
+        mcap::write_shown(&folder.join(RECORDING), &recording, &building, moments)?;
         files.push(RECORDING.to_owned());
         if !quiet {
             print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;

@@ -9,6 +9,7 @@ mod follower;
 mod json;
 mod modes;
 mod reach;
+pub mod scene;
 mod start;
 
 pub use error::Error;

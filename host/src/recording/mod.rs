@@ -20,6 +20,7 @@ mod message;
 mod openshoe;
 mod plain;
 pub mod profile;
+pub mod scene;
 mod table;
 mod text;
 pub mod truth;

@@ -2,9 +2,10 @@
 
 use crate::cli::located::{Following, InBuilding};
 use crate::cli::{Error, live::words};
-use crate::follow::mode_word;
+use crate::follow::{mode_word, scene};
 use crate::link::Connection;
 use crate::link::ground::ShoeMode;
+use crate::recording::scene::{Lines, Moment};
 use serde_json::{Value as Json, json};
 use sohle_shared::step::{FloorMode, Step};
 use sohle_shared::wire::message::Outcome;
@@ -29,6 +30,7 @@ pub struct Places {
 pub struct Told {
     pub text: String,
     pub object: Json,
+    pub moment: Moment,
 }
 
 impl Places {
@@ -75,7 +77,13 @@ impl Places {
         let (said, object) = self.following.step(step, host_us.map(|host| opened_us + host));
         self.unusual += u64::from(said.unusual.is_some());
         self.shoe.want(said.mode);
-        Some(Told { text: words::place(&said), object })
+        let moment = scene::moment(self.following.follower(), &said, object.to_string());
+        Some(Told { text: words::place(&said), object, moment })
+    }
+
+    /// The plan, for viewers.
+    pub fn plan(&self) -> Vec<Lines> {
+        scene::building(self.following.follower().building())
     }
 
     /// The floor mode that is to be sent to the shoe now, if one is.

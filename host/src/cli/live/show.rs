@@ -48,6 +48,7 @@ pub struct Show {
     opened_us: i64,
     /// The boot whose date is in the recording.
     dated: Option<u32>,
+    plan_recorded: bool,
 }
 
 impl Show {
@@ -85,7 +86,7 @@ impl Show {
         self.date(connection);
         if let Some(places) = &mut self.places {
             let told = places.known(self.opened_us, connection);
-            self.tell(&told);
+            self.tell(told);
         }
         let event = match happening {
             Happening::Opened => return self.say("the port is open"),
@@ -175,20 +176,24 @@ impl Show {
         }
         if let Some(places) = &mut self.places {
             let told = places.step(&step, self.opened_us, connection);
-            self.tell(&told);
+            self.tell(told);
         }
     }
 
-    /// Tells where somebody is.
-    fn tell(&self, told: &[Told]) {
-        if self.quiet || self.output_taken {
-            return;
-        }
-        for told in told {
+    /// Tells where somebody is, and records it for viewers.
+    fn tell(&mut self, told: Vec<Told>) {
+        for Told { text, object, moment } in told {
+            // Nobody who reads is no reason to stop recording.
             let _ = match self.format {
-                Format::Table => print(&told.text),
-                Format::Json => print(&format!("{}\n", told.object)),
+                _ if self.quiet || self.output_taken => Ok(()),
+                Format::Table => print(&text),
+                Format::Json => print(&format!("{object}\n")),
             };
+            let Some(recorder) = &mut self.recorder else { continue };
+            if let Some(places) = self.places.as_ref().filter(|_| !self.plan_recorded) {
+                self.plan_recorded = recorder.building(places.plan(), moment.time);
+            }
+            recorder.moment(moment);
         }
     }
 

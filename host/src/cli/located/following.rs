@@ -5,8 +5,9 @@ use super::{picture, summary};
 use crate::building::georeference::Projection;
 use crate::cli::{Error, print};
 use crate::export::{file, png};
-use crate::follow::{self, Follower, LONGEST_STEP_M, Said, Unusual};
+use crate::follow::{self, Follower, LONGEST_STEP_M, Said, Unusual, scene};
 use crate::recording::Recording;
+use crate::recording::scene::{Lines, Moment};
 use serde_json::Value;
 use sohle_shared::step::Step;
 use std::path::Path;
@@ -23,6 +24,8 @@ pub struct Following {
     unix_us: Vec<Option<i64>>,
     /// The lines that were handed on, when they are kept for the folder of results.
     lines: Option<String>,
+    /// What viewers show, when it is kept for the recording.
+    moments: Option<Vec<Moment>>,
 }
 
 impl Following {
@@ -30,13 +33,19 @@ impl Following {
     pub fn new(follower: Follower, wanted: &Wanted) -> Result<Self, Error> {
         let projection = follower.building().georeference.projection()?;
         let outputs = wanted.open(projection.as_ref())?;
-        Ok(Self { follower, projection, outputs, unix_us: Vec::new(), lines: None })
+        Ok(Self { follower, projection, outputs, unix_us: Vec::new(), lines: None, moments: None })
     }
 
-    /// Keeps the lines, for [`Following::finish`] to write them into its folder.
-    pub fn keeping_lines(mut self) -> Self {
+    /// Keeps the lines, for [`Following::finish`] to write them into its folder, and what viewers show.
+    pub fn keeping_all(mut self) -> Self {
         self.lines = Some(String::new());
+        self.moments = Some(Vec::new());
         self
+    }
+
+    /// What viewers show of it: the plan, and the moments that were kept.
+    pub fn shown(&self) -> (Vec<Lines>, &[Moment]) {
+        (scene::building(self.follower.building()), self.moments.as_deref().unwrap_or_default())
     }
 
     /// The follower.
@@ -44,7 +53,7 @@ impl Following {
         &self.follower
     }
 
-    /// Follows a step, and hands on what is said, which is also the second answer. `unix_us` is the date of its end, if that
+    /// Follows a step, and hands on what is said, which is also the second answer, as JSON. `unix_us` is the date of its end, if that
     /// is known. **Units:** microseconds since the beginning of 1970.
     pub fn step(&mut self, step: &Step, unix_us: Option<i64>) -> (Said, Value) {
         let said = self.follower.step(step);
@@ -65,6 +74,9 @@ impl Following {
             *lines += &line;
             lines.push('\n');
         }
+        if let Some(moments) = &mut self.moments {
+            moments.push(scene::moment(&self.follower, &said, line));
+        }
         (said, object)
     }
 
@@ -81,7 +93,7 @@ impl Following {
 
     /// Writes the tracks that were asked for and, with a folder, the pictures of the floors; returns what there is to tell.
     pub fn finish(self, recording: Option<&Recording>, folder: Option<&Path>) -> Result<String, Error> {
-        let Self { follower, projection, outputs, unix_us, lines } = self;
+        let Self { follower, projection, outputs, unix_us, lines, .. } = self;
         outputs.finish(&walk(&follower, &unix_us, projection.as_ref()))?;
         if follower.path().is_empty() {
             return Err(Error::new("there are no steps to follow in the building"));

@@ -4,11 +4,11 @@ use crate::building::picture::{Dots, Look, Mark, Trace, draw_with};
 use crate::follow::Follower;
 use crate::particle::State;
 
-/// Colours of the document's map (Foot, 6.2.1): particles green, the path red; the corrected one blue, the truth black.
+/// Colours of the document's map (Foot, 6.2.1): particles green, the path red; the corrected one blue, the truth violet.
 const PARTICLES: &str = "#3a9b57";
 const LIVE: &str = "#c8322d";
 const CORRECTED: &str = "#2456b4";
-const TRUTH: &str = "#20242a";
+const TRUTH: &str = "#8a3fb0";
 /// More particles are not drawn.
 const MOST_DRAWN: usize = 20_000;
 /// More places are not marked.
@@ -21,7 +21,8 @@ pub fn draw(follower: &Follower, index: usize, truth: &[[f64; 3]]) -> String {
     let building = follower.building();
     let floor = &building.floors[index];
     let live = pieces(follower.path().iter().map(|followed| {
-        let place = followed.place.as_ref()?;
+        // Whoever searches has no path.
+        let place = followed.place.as_ref().filter(|_| followed.state == State::Located)?;
         (place.floor == floor.number).then_some([place.position.x, place.position.y])
     }));
     let past = follower.past();
@@ -35,7 +36,7 @@ pub fn draw(follower: &Follower, index: usize, truth: &[[f64; 3]]) -> String {
     let places = particles.map(|particle| [particle.x, particle.y].map(f64::from)).collect();
     let dots = [Dots { label: "particles at the end", colour: PARTICLES, places }];
     let traces = [
-        Trace { label: "truth", colour: TRUTH, width: 1.0, pieces: truth },
+        Trace { label: "truth", colour: TRUTH, width: 1.2, pieces: truth },
         Trace { label: "as it was said", colour: LIVE, width: 1.5, pieces: live },
         Trace { label: "corrected", colour: CORRECTED, width: 2.5, pieces: corrected },
     ];
