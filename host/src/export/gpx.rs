@@ -113,7 +113,7 @@ mod tests {
         assert_eq!(sizes, [vec![2, 3], vec![6]]);
         let last = read.tracks[1].segments[0].points.last().unwrap();
         assert_eq!(last.elevation, Some(3.6));
-        assert_eq!(last.time.unwrap().format().unwrap(), "2023-11-14T22:13:25.5Z");
+        assert_eq!(last.time.unwrap().format().unwrap(), "2023-11-14T22:13:25.500000000Z");
         let back = projection.to_building([last.point().x(), last.point().y()]).unwrap();
         assert!((back[0] - 15.0).abs() < 1e-3 && (back[1] - 5.0).abs() < 1e-3, "{back:?}");
         assert!(text.contains("<sohle:floor>1</sohle:floor><sohle:sigma_m>0.250</sohle:sigma_m>"), "{text}");
