@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use sohle_shared::sample::ImuSample;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
-use sohle_shared::tracker::{Counters, Parameters, Tracker};
+use sohle_shared::tracker::{Counters, Order, Parameters, Tracker};
 
 /// A stance and where it was.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +45,26 @@ pub struct Track {
     pub span: Option<(Micros, Micros)>,
 }
 
+/// Gives a tracker orders while it tracks, as a map does over the wire.
+pub trait Steer {
+    /// Orders that it gets before the sample of this number, counted from 0.
+    fn before(&mut self, _sample: usize) -> Vec<Order> {
+        Vec::new()
+    }
+
+    /// Sees each step as it is made; the order that follows from it.
+    fn after(&mut self, step: &Step) -> Option<Order>;
+}
+
+/// Nobody gives orders.
+struct Unsteered;
+
+impl Steer for Unsteered {
+    fn after(&mut self, _step: &Step) -> Option<Order> {
+        None
+    }
+}
+
 /// Spacing of [`Track::path`]. **Units:** microseconds.
 pub const PATH_PERIOD_US: i64 = 10_000;
 
@@ -61,14 +81,29 @@ impl Track {
 
     /// Feeds `samples` through a tracker.
     pub fn of(samples: impl IntoIterator<Item = ImuSample>, parameters: &Parameters) -> Self {
+        Self::steered(samples, parameters, &mut Unsteered)
+    }
+
+    /// The same, with somebody who gives the tracker orders.
+    pub fn steered(
+        samples: impl IntoIterator<Item = ImuSample>,
+        parameters: &Parameters,
+        steer: &mut impl Steer,
+    ) -> Self {
         let mut tracker = Tracker::new(parameters);
         let mut track = Self::default();
         let mut due = None;
-        for sample in samples {
+        for (index, sample) in samples.into_iter().enumerate() {
+            for order in steer.before(index) {
+                tracker.obey(order);
+            }
             let output = tracker.push(&sample);
             track.span = Some((track.span.map_or(sample.time, |(first, _)| first), sample.time));
             if let Some(step) = output.step {
                 track.add(step);
+                if let Some(order) = steer.after(&step) {
+                    tracker.obey(order);
+                }
             }
             if let Some(stance) = track.stances.last_mut().filter(|_| output.reported) {
                 stance.end = sample.time;
@@ -80,6 +115,7 @@ impl Track {
         }
         if let Some(step) = tracker.finish() {
             track.add(step);
+            steer.after(&step);
         }
         track.counters = *tracker.counters();
         track

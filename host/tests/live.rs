@@ -74,8 +74,18 @@ fn speak<const STEPS: usize>(shoe: &mut Shoe<STEPS>, line: &mut TcpStream, now: 
     raw
 }
 
+/// A shoe that has walked and stood for a minute since.
+fn stand_later(listener: &TcpListener) {
+    stand_since(listener, Batches::new(), 100_000_000);
+}
+
 /// A shoe that has walked, stands and answers, laptop after laptop, until the process ends.
 fn stand(listener: &TcpListener, walked: impl Iterator<Item = Batch>) {
+    stand_since(listener, walked, 0);
+}
+
+/// The same, whose clock is at `from_us`.
+fn stand_since(listener: &TcpListener, walked: impl Iterator<Item = Batch>, from_us: i64) {
     let identity = Identity { boot: 6, firmware: "test", board: "test" };
     let outbox = Outbox::<64>::new(0, Pace::default());
     let mut shoe = Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default(), outbox);
@@ -85,7 +95,7 @@ fn stand(listener: &TcpListener, walked: impl Iterator<Item = Batch>) {
         let mut line = accept(listener);
         let mut bytes = [0; 256];
         loop {
-            let now = Micros(begun.elapsed().as_micros() as i64);
+            let now = Micros(from_us + begun.elapsed().as_micros() as i64);
             match line.read(&mut bytes) {
                 Ok(0) => break,
                 Ok(count) => shoe.received(&bytes[..count], now),
@@ -201,4 +211,93 @@ fn a_recording_is_not_replaced() {
     let err = String::from_utf8_lossy(&live.stderr);
     assert!(!live.status.success() && err.contains("walk.mcap is there already"), "{err}");
     assert_eq!(std::fs::read(&path).unwrap(), b"an earlier walk");
+}
+
+/// The twin of the document's building.
+fn twin() -> String {
+    format!("{}/../buildings/twin.geojson", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn a_live_walk_is_followed_in_a_building_served_and_the_shoe_told_its_floor_mode() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp:127.0.0.1:{}", listener.local_addr().unwrap().port());
+    std::thread::spawn(move || walk(&listener));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("live.mcap");
+    // A free port, which nobody takes in the next moment.
+    let serve = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let url = format!("ws://{serve}");
+    let client = std::thread::spawn(move || {
+        let until = Instant::now() + Duration::from_secs(30);
+        let mut socket = loop {
+            match tungstenite::connect(&url) {
+                Ok((socket, _)) => break socket,
+                Err(error) if Instant::now() > until => panic!("{error}"),
+                Err(_) => std::thread::sleep(Duration::from_millis(20)),
+            }
+        };
+        let mut lines = Vec::new();
+        while let Ok(message) = socket.read() {
+            lines.extend(message.to_text().ok().filter(|text| text.starts_with('{')).map(str::to_owned));
+        }
+        lines
+    });
+    let (twin, steps) = (twin(), STRIDES.to_string());
+    let pictures = folder.path().join("pictures");
+    let live = sohle(
+        &[
+            &["live", &address, "--raw", "--out", path.to_str().unwrap(), "--steps", &steps, "--for", "60"][..],
+            &["--building", &twin, "--serve", &serve, "--format", "json", "--pictures", pictures.to_str().unwrap()],
+        ]
+        .concat(),
+    );
+    let (out, err) = (String::from_utf8_lossy(&live.stdout), String::from_utf8_lossy(&live.stderr));
+    assert!(live.status.success(), "{out}{err}");
+    assert!(err.contains("the shoe takes the ground for: auto"), "{err}");
+    let events: Vec<serde_json::Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let said = |event: &str| events.iter().filter(|other| other["event"] == event).cloned().collect::<Vec<_>>();
+    let (steps, places) = (said("step"), said("place"));
+    assert_eq!((steps.len(), places.len()), (STRIDES, STRIDES), "{out}");
+    assert!(places.iter().zip(&steps).all(|(place, step)| place["time_us"] == step["stance_end_us"]));
+    // This century.
+    assert!(places.last().unwrap()["unix_us"].as_i64().unwrap() > 1_000_000_000_000_000);
+    let summary = &said("summary")[0]["places"];
+    assert_eq!((&summary["followed"], &summary["before_start"]), (&STRIDES.into(), &0.into()));
+    assert!(summary["floor_modes_told"].as_u64().unwrap() >= 1, "{summary}");
+    let served = client.join().unwrap();
+    assert!(served.len() >= STRIDES - 2, "{} of {STRIDES} lines: {err}", served.len());
+    assert_eq!(serde_json::from_str::<serde_json::Value>(served.last().unwrap()).unwrap(), places[STRIDES - 1]);
+    assert!(pictures.join("floor0.png").exists() && pictures.join("floor1.svg").exists());
+
+    // The orders are in the recording, so that the steps are made again with them.
+    let recording = sohle::recording::open(&path, None).unwrap();
+    assert!(!recording.orders.is_empty() && recording.again.unwrap().is_whole(), "{:?}", recording.again);
+    assert!(recording.metadata.contains_key("began_unix_us"));
+}
+
+#[test]
+fn steps_from_before_the_start_are_told_and_not_followed() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp:127.0.0.1:{}", listener.local_addr().unwrap().port());
+    // They were made before anybody connects, by a clock that has gone on since.
+    std::thread::spawn(move || stand_later(&listener));
+    let steps = STRIDES.to_string();
+    let twin = twin();
+    let live = |start: &str| {
+        let live = sohle(
+            &[
+                &["live", &address, "--no-record", "--steps", &steps, "--for", "20", "--format", "json"][..],
+                &["--building", &twin, "--start", start],
+            ]
+            .concat(),
+        );
+        let (out, err) = (String::from_utf8_lossy(&live.stdout), String::from_utf8_lossy(&live.stderr));
+        assert!(live.status.success(), "{out}{err}");
+        let events: Vec<serde_json::Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        events.last().unwrap().clone()
+    };
+    let summary = live("W02");
+    assert_eq!(summary["steps"], STRIDES);
+    assert_eq!((&summary["places"]["before_start"], &summary["places"]["followed"]), (&STRIDES.into(), &0.into()));
 }

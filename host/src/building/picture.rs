@@ -37,6 +37,8 @@ pub enum Look {
     Error,
     /// Should be looked at.
     Warning,
+    /// Where somebody is.
+    Place,
 }
 
 /// A place that is pointed at.
@@ -270,6 +272,7 @@ impl Plan {
         let colour = match mark.look {
             Look::Error => "#c4252b",
             Look::Warning => "#d9822b",
+            Look::Place => "#2456b4",
         };
         pen.circle(at, 7.0, "none", (colour, 2.2));
         let lettering = Lettering { size: 14.0, colour, anchor: Anchor::Start };

@@ -1,6 +1,6 @@
 //! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
 
-use super::located::InBuilding;
+use super::located::{Following, InBuilding, finish_and_tell};
 use super::report::{Report, Settings};
 use super::{Error, Output, convert, parameters, print};
 use crate::calibration;
@@ -40,7 +40,8 @@ pub struct Args {
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
     let Args { file, profile, parameters, calibration, compare, place, output } = args;
-    let follower = place.prepare()?;
+    let mut following = place.prepare()?.map(Following::keeping_all);
+    let quiet = output.quiet || place.how.wanted.takes_stdout();
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut settings = vec![match &parameters {
         Some(path) => Settings { label: stem(path), parameters: parameters::read(path)?, ..Settings::default() },
@@ -54,23 +55,24 @@ pub fn run(args: Args) -> Result<(), Error> {
     let recording = recording::open(&file, profile.as_ref())?;
     let again = recording.again;
     if let Some(again) = &again
-        && !output.quiet
+        && !quiet
     {
         print(&format!("{again}\n"))?;
     }
     let folder = output.folder(&stem(&file));
-    let track = Report {
+    let recording = Report {
         title: recording.name.clone(),
         recording,
         calibration,
         settings,
         folder: &folder,
         origin: output.origin,
-        quiet: output.quiet,
+        following: following.as_mut(),
+        quiet,
     }
     .run()?;
-    if let Some(follower) = follower {
-        follower.run(&track, &folder, output.quiet)?;
+    if let Some(following) = following {
+        finish_and_tell(following, &recording, &folder, quiet)?;
     }
     match again {
         Some(again) if !again.is_whole() => Err(Error::new(format!("computed again, the steps differ: {again}"))),

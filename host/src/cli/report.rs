@@ -1,5 +1,6 @@
 //! What `demo` and `replay` share: a recording is tracked with one or two sets of settings, judged, shown and written.
 
+use super::located::Following;
 use super::table::Table;
 use super::{Error, print, progress};
 use crate::evaluation::alignment::{ALIGNED_START_M, Rigid, path_length};
@@ -10,13 +11,14 @@ use crate::evaluation::{Metric, Metrics};
 use crate::export::geojson::Origin;
 use crate::export::picture::{Dot, Line, Picture, Placement, Role};
 use crate::export::{self, Named, file};
+use crate::recording::live::BEGAN;
 use crate::recording::{Recording, SimulatedTruth, mcap};
-use crate::track::Track;
+use crate::track::{Steer, Track};
 use indicatif::ProgressIterator;
 use sohle_shared::calibration::Calibration;
 use sohle_shared::sample::ImuSample;
-use sohle_shared::step::FloorMode;
-use sohle_shared::tracker::Parameters;
+use sohle_shared::step::{FloorMode, Step};
+use sohle_shared::tracker::{Order, Parameters};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -64,6 +66,8 @@ pub struct Report<'a> {
     pub folder: &'a Path,
     /// Where on Earth the walk began.
     pub origin: Option<Origin>,
+    /// Follows the steps of the first settings through a building while they are made, and tells the tracker its floor mode.
+    pub following: Option<&'a mut Following>,
     /// Whether nothing but errors is to be said.
     pub quiet: bool,
 }
@@ -78,12 +82,17 @@ struct Outcome {
 }
 
 impl Report<'_> {
-    /// Does it all; returns the track of the first settings.
-    pub fn run(self) -> Result<Track, Error> {
+    /// Does it all; returns the recording as it was written, with the steps of the first settings.
+    pub fn run(self) -> Result<Recording, Error> {
         file::folder(self.folder)?;
-        let Self { title, mut recording, calibration, settings, folder, origin, quiet } = self;
-        let outcomes: Vec<_> =
-            settings.into_iter().map(|settings| outcome(&recording, calibration.as_ref(), settings, quiet)).collect();
+        let Self { title, mut recording, calibration, settings, folder, origin, mut following, quiet } = self;
+        let mut outcomes = Vec::new();
+        for settings in settings {
+            outcomes.push({
+                let first = outcomes.is_empty();
+                outcome(&recording, calibration.as_ref(), settings, following.as_deref_mut().filter(|_| first), quiet)
+            });
+        }
         let table = table(&recording, &outcomes);
         let picture = picture(title, note(&recording, calibration.as_ref(), &outcomes), &recording, &outcomes, &table);
         if !quiet {
@@ -105,12 +114,13 @@ impl Report<'_> {
             files.push(CALIBRATION.to_owned());
             recording.metadata.insert("calibration".into(), text);
         }
-        mcap::write(&folder.join(RECORDING), &recording)?;
+        let (building, moments) = following.as_ref().map(|following| following.shown()).unwrap_or_default();
+        mcap::write_shown(&folder.join(RECORDING), &recording, &building, moments)?;
         files.push(RECORDING.to_owned());
         if !quiet {
             print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;
         }
-        Ok(outcomes.into_iter().next().map(|outcome| outcome.track).unwrap_or_default())
+        Ok(recording)
     }
 }
 
@@ -122,19 +132,56 @@ impl Outcome {
 }
 
 /// Tracks a recording and compares the track with what is known.
-fn outcome(recording: &Recording, calibration: Option<&Calibration>, settings: Settings, quiet: bool) -> Outcome {
+fn outcome(
+    recording: &Recording,
+    calibration: Option<&Calibration>,
+    settings: Settings,
+    following: Option<&mut Following>,
+    quiet: bool,
+) -> Outcome {
     let bar = progress(recording.samples.len() as u64, &format!("tracking ({})", settings.label), quiet);
     let begun = Instant::now();
     let correct = |sample: &ImuSample| calibration.map_or(*sample, |calibration| calibration.apply(sample, None));
+    let began_us = recording.metadata.get(BEGAN).and_then(|text| text.parse().ok());
+    let (orders, wanted) = (&recording.orders[..], recording.orders.is_empty());
+    let mut steering = Steering { orders, following, mode: None, wanted, began_us };
     let track = if recording.samples.is_empty() {
+        recording.steps.iter().for_each(|step| _ = steering.after(step));
         Track::of_steps(&recording.steps)
     } else {
-        Track::of(recording.samples.iter().map(correct).progress_with(bar), &settings.parameters)
+        let samples = recording.samples.iter().map(correct).progress_with(bar);
+        Track::steered(samples, &settings.parameters, &mut steering)
     };
     let taken = begun.elapsed();
     let metrics = recording.truth.as_ref().map(|truth| score(&track, &Truth::from(truth)));
     let placement = recording.truth.as_ref().map_or_else(Placement::default, |truth| placement(&track, truth));
     Outcome { settings, track, taken, metrics, placement }
+}
+
+/// What the tracker of a recording is told: what the shoe was told when it was recorded, else what a building asks for.
+struct Steering<'a> {
+    orders: &'a [(usize, Order)],
+    following: Option<&'a mut Following>,
+    mode: Option<FloorMode>,
+    /// What the building asks for is done.
+    wanted: bool,
+    /// When the time of the recording was zero, if it knows its date. **Units:** microseconds since the beginning of 1970.
+    began_us: Option<i64>,
+}
+
+impl Steer for Steering<'_> {
+    fn before(&mut self, sample: usize) -> Vec<Order> {
+        let count = self.orders.iter().take_while(|(at, _)| *at <= sample).count();
+        let (due, later) = self.orders.split_at(count);
+        self.orders = later;
+        due.iter().map(|(_, order)| *order).collect()
+    }
+
+    fn after(&mut self, step: &Step) -> Option<Order> {
+        let mode = self.following.as_mut()?.step(step, self.began_us.map(|began| began + step.stance_end.0)).0.mode;
+        let changed = mode != std::mem::replace(&mut self.mode, mode);
+        (changed && self.wanted).then_some(Order::FloorMode(mode))
+    }
 }
 
 /// Lays a track on the truth at the first stance that both have and along the first metres, as the end error does.

@@ -5,12 +5,15 @@
 
 pub mod file;
 pub mod geojson;
+pub mod gpx;
 pub(crate) mod pen;
 pub mod picture;
 pub mod png;
 pub(crate) mod scale;
 pub mod steps_csv;
 pub mod svg;
+pub mod walk;
+pub mod walk_geojson;
 
 use crate::track::Track;
 use picture::{Picture, Placement, Role};

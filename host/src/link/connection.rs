@@ -156,6 +156,11 @@ impl Connection {
         Err(AskError::Late(PATIENCE.as_secs()))
     }
 
+    /// Asks the shoe to do something, and does not wait: the answer is a [`Event::Reply`] with the number that is returned.
+    pub fn tell(&mut self, action: Action) -> u32 {
+        self.session.command(action)
+    }
+
     /// Reads a value of the shoe.
     pub fn read(&mut self, item: Item, meanwhile: &mut impl FnMut(Happening, &Self)) -> Result<Value, AskError> {
         let mut assembly = Assembly::new();

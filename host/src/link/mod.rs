@@ -13,6 +13,7 @@ pub mod connection;
 mod copies;
 pub mod endurance;
 pub mod event;
+pub mod ground;
 pub mod line;
 mod questions;
 pub mod recorder;

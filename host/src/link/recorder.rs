@@ -6,6 +6,8 @@
 use crate::recording::RecordingError;
 use crate::recording::heard::Heard;
 use crate::recording::mcap::Writer;
+use crate::recording::scene::{Lines, Moment};
+use sohle_shared::time::Micros;
 use sohle_shared::wire::message::FromShoe;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,6 +23,8 @@ const FLUSHED: Duration = Duration::from_secs(1);
 enum Entry {
     Heard(Box<Heard>),
     About(BTreeMap<String, String>),
+    Building(Vec<Lines>, Micros),
+    Moment(Box<Moment>),
 }
 
 /// A recording that goes on.
@@ -62,6 +66,16 @@ impl Recorder {
         self.send(Entry::About(BTreeMap::from([(key.to_owned(), text)])))
     }
 
+    /// Records the plan of a building, for viewers.
+    pub fn building(&mut self, lines: Vec<Lines>, time: Micros) -> bool {
+        self.send(Entry::Building(lines, time))
+    }
+
+    /// Records what was said after a step, for viewers.
+    pub fn moment(&mut self, moment: Moment) -> bool {
+        self.send(Entry::Moment(Box::new(moment)))
+    }
+
     fn send(&mut self, entry: Entry) -> bool {
         match self.entries.try_send(entry) {
             Ok(()) => true,
@@ -97,6 +111,8 @@ fn write(mut writer: Writer, entries: &Receiver<Entry>) -> Result<u64, Recording
                 writer.heard(&heard)?;
             }
             Ok(Entry::About(about)) => writer.about(&about)?,
+            Ok(Entry::Building(lines, time)) => writer.building(&lines, time)?,
+            Ok(Entry::Moment(moment)) => writer.moment(&moment)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return writer.finish(),
         }

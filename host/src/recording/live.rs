@@ -13,7 +13,7 @@ use sohle_shared::calibration::Calibration;
 use sohle_shared::sample::ImuSample;
 use sohle_shared::shoe::Pipeline;
 use sohle_shared::time::Micros;
-use sohle_shared::tracker::{Output, Parameters, Tracker};
+use sohle_shared::tracker::{Order, Output, Parameters, Tracker};
 use sohle_shared::wire::message::{Attitude, FromShoe, RawItem};
 use sohle_shared::wire::packed::PackedStep;
 use std::collections::BTreeMap;
@@ -21,6 +21,8 @@ use std::fmt;
 
 /// Metadata in which the parameters of the shoe are kept.
 pub const PARAMETERS: &str = "parameters";
+/// Metadata in which is kept when the clock of the shoe was zero: microseconds since the beginning of 1970.
+pub const BEGAN: &str = "began_unix_us";
 /// Metadata in which the calibration of the shoe is kept.
 pub const CALIBRATION: &str = "calibration";
 
@@ -77,6 +79,7 @@ pub(super) fn compute(heard: &[Heard], recording: &mut Recording) -> Result<(), 
     let mut told = Told::of(heard);
     // Each boot has a time of its own.
     let mut samples: BTreeMap<u32, Vec<ImuSample>> = BTreeMap::new();
+    let mut orders: BTreeMap<u32, Vec<(usize, Order)>> = BTreeMap::new();
     let mut pipeline: Option<Pipeline> = None;
     let (mut boot, mut next) = (0, 0);
     let mut begun = 0;
@@ -109,13 +112,19 @@ pub(super) fn compute(heard: &[Heard], recording: &mut Recording) -> Result<(), 
                 told.compare(boot, sample, output, tracker);
                 samples.push(*sample);
             }),
-            (RawItem::Order(order), Some(pipeline)) => _ = pipeline.obey(*order),
+            (RawItem::Order(order), Some(pipeline)) => {
+                orders.entry(boot).or_default().push((samples.len(), *order));
+                pipeline.obey(*order);
+            }
             (_, None) => {}
         }
     }
     told.end(boot, samples.get(&boot), begun);
     told.agreement.boots = samples.len();
-    recording.samples = samples.into_values().max_by_key(Vec::len).unwrap_or_default();
+    if let Some((boot, longest)) = samples.into_iter().max_by_key(|(_, samples)| samples.len()) {
+        recording.samples = longest;
+        recording.orders = orders.remove(&boot).unwrap_or_default();
+    }
     recording.again = Some(told.agreement);
     Ok(())
 }

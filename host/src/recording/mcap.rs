@@ -2,7 +2,8 @@
 //!
 //! # What is inside
 //! One channel for each kind of [message](super::message): `/imu`, and where known `/truth/pose`, `/truth/stance`,
-//! `/step`; of a live walk also `/shoe`, which holds every [message of the shoe](super::heard). Their schemas are
+//! `/step`; of a live walk also `/shoe`, which holds every [message of the shoe](super::heard); of a walk that was followed in
+//! a building also what [viewers show](super::scene) of it. Their schemas are
 //! `ros2msg` text, their messages CDR. The record of metadata `sohle` holds name, sensor range and version; the record
 //! `about` whatever the writer had to say (parameters, seeds, origin). Nothing is compressed: the decoders of MCAP's
 //! compressions are C code.
@@ -17,6 +18,7 @@
 use super::error::{Problem, RecordingError};
 use super::heard::Heard;
 use super::message::{Encoder, Message};
+use super::scene::{self, Lines, Moment, Shown};
 use super::truth::{TruthPose, TruthStance};
 use super::{Recording, SensorRange, live, table};
 use mcap::records::{ChunkHeader, MessageHeader, Metadata, Record, op};
@@ -24,6 +26,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use mcap::{McapError, WriteOptions};
 use sohle_shared::sample::ImuSample;
 use sohle_shared::step::Step;
+use sohle_shared::time::Micros;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufWriter, Read};
@@ -140,10 +143,10 @@ impl Writer {
         self.whole(mcap::Writer::flush)
     }
 
-    fn whole(
+    fn whole<T>(
         &mut self,
-        work: impl FnOnce(&mut mcap::Writer<BufWriter<File>>) -> Result<(), McapError>,
-    ) -> Result<(), RecordingError> {
+        work: impl FnOnce(&mut mcap::Writer<BufWriter<File>>) -> Result<T, McapError>,
+    ) -> Result<T, RecordingError> {
         let done = self.inner.as_mut().ok_or(McapError::AttemptedWriteAfterFailure).and_then(work);
         done.map_err(|error| RecordingError { path: self.target.clone(), problem: problem(error) })
     }
@@ -166,6 +169,36 @@ impl Writer {
     /// Appends a step.
     pub fn step(&mut self, step: &Step) -> Result<(), RecordingError> {
         self.message(step)
+    }
+
+    /// Appends the plan of a building, for viewers.
+    pub fn building(&mut self, lines: &[Lines], time: Micros) -> Result<(), RecordingError> {
+        self.shown(&scene::building(lines, time), time)
+    }
+
+    /// Appends what was said after a step, for viewers.
+    pub fn moment(&mut self, moment: &Moment) -> Result<(), RecordingError> {
+        if let Some(place) = &moment.place {
+            self.shown(&scene::place(place, moment.time), moment.time)?;
+        }
+        self.shown(&scene::cloud(&moment.particles, moment.time), moment.time)?;
+        let channel = self.whole(|inner| inner.add_channel(0, scene::LINE_TOPIC, "json", &BTreeMap::new()))?;
+        self.write_to(channel, 0, moment.time, moment.line.as_bytes())
+    }
+
+    fn shown(&mut self, shown: &Shown, time: Micros) -> Result<(), RecordingError> {
+        // The library knows schemas and channels that it has been given before.
+        let channel = self.whole(|inner| {
+            let schema = inner.add_schema(shown.schema, SCHEMA_ENCODING, shown.definition.as_bytes())?;
+            inner.add_channel(schema, shown.topic, MESSAGE_ENCODING, &BTreeMap::new())
+        })?;
+        self.write_to(channel, 0, time, &shown.bytes)
+    }
+
+    fn write_to(&mut self, channel_id: u16, sequence: u32, time: Micros, bytes: &[u8]) -> Result<(), RecordingError> {
+        let log_time = log_time(time);
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        self.whole(|inner| inner.write_to_known_channel(&header, bytes))
     }
 
     /// Completes the file and gives it its name. Returns its size. **Units:** bytes.
@@ -206,13 +239,17 @@ impl Writer {
         let (channel_id, count) = self.channel::<M>()?;
         let (channel_id, sequence) = (*channel_id, *count);
         *count = count.wrapping_add(1);
-        // MCAP counts unsigned nanoseconds; what lies before zero is shown at zero and keeps its time inside.
-        let log_time = u64::try_from(message.time().0).unwrap_or(0).saturating_mul(1000);
+        let log_time = log_time(message.time());
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         let bytes = message.encode(&mut self.buffer);
         let inner = self.inner.as_mut().ok_or(McapError::AttemptedWriteAfterFailure)?;
         inner.write_to_known_channel(&header, bytes)
     }
+}
+
+/// MCAP counts unsigned nanoseconds; what lies before zero is shown at zero and keeps its time inside.
+fn log_time(time: Micros) -> u64 {
+    u64::try_from(time.0).unwrap_or(0).saturating_mul(1000)
 }
 
 impl Drop for Writer {
@@ -227,6 +264,16 @@ impl Drop for Writer {
 
 /// Writes a whole recording. Returns the size of the file. **Units:** bytes.
 pub fn write(target: &Path, recording: &Recording) -> Result<u64, RecordingError> {
+    write_shown(target, recording, &[], &[])
+}
+
+/// The same with what viewers show of a walk in a building.
+pub fn write_shown(
+    target: &Path,
+    recording: &Recording,
+    building: &[Lines],
+    moments: &[Moment],
+) -> Result<u64, RecordingError> {
     let mut writer = Writer::create(target, &recording.name, recording.range, &recording.metadata)?;
     for sample in &recording.samples {
         writer.sample(sample)?;
@@ -241,6 +288,12 @@ pub fn write(target: &Path, recording: &Recording) -> Result<u64, RecordingError
     }
     for step in &recording.steps {
         writer.step(step)?;
+    }
+    if let Some(first) = moments.first() {
+        writer.building(building, first.time)?;
+    }
+    for moment in moments {
+        writer.moment(moment)?;
     }
     writer.finish()
 }
@@ -559,6 +612,7 @@ mod tests {
             }),
             steps: vec![step(0), step(1)],
             again: None,
+            orders: Vec::new(),
             metadata: BTreeMap::from([("parameters".to_owned(), "gain = 0.1\n[stance]\n".to_owned())]),
         }
     }

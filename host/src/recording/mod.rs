@@ -20,6 +20,7 @@ mod message;
 mod openshoe;
 mod plain;
 pub mod profile;
+pub mod scene;
 mod table;
 mod text;
 pub mod truth;
@@ -34,6 +35,7 @@ pub use truth::{SimulatedTruth, TruthPose, TruthStance};
 
 use sohle_shared::sample::ImuSample;
 use sohle_shared::step::Step;
+use sohle_shared::tracker::Order;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -80,6 +82,9 @@ pub struct Recording {
     pub steps: Vec<Step>,
     /// What came of computing a live walk again; only from the project's own format, and only if the shoe's counts are in it.
     pub again: Option<live::Agreement>,
+    /// Orders that the tracker on the shoe got, each with the number of samples before it; only of a live walk whose counts
+    /// are in it.
+    pub orders: Vec<(usize, Order)>,
     /// What else is known: where it came from, parameters, seeds, versions.
     pub metadata: BTreeMap<String, String>,
     /// What is irregular about the samples.

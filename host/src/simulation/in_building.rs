@@ -24,7 +24,7 @@ impl Route {
         let Some(&[x, y]) = points.first() else {
             return Err(Error::Model("a way through a building begins somewhere".to_owned()));
         };
-        let mut route = Self { start: [x, y, height], ..Self::default() };
+        let mut route = Self { building: Some(building.name.clone()), start: [x, y, height], ..Self::default() };
         let mut legs = Vec::new();
         let walk = |legs: &mut Vec<Leg>, points: &[[f64; 2]]| {
             if points.len() > 1 {

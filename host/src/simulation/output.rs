@@ -90,6 +90,7 @@ pub fn write(
             let mut about = BTreeMap::from([("origin".to_owned(), "simulated".to_owned())]);
             // A scenario that has been checked can be written.
             about.extend(toml::to_string(scenario).ok().map(|text| ("scenario".to_owned(), text)));
+            about.extend(scenario.route.building.iter().map(|name| ("building".to_owned(), name.clone())));
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             let mut writer = Writer::create(path, &name, range, &about)?;
             let summary = recording(simulation, &mut writer, thinning, progress)?;

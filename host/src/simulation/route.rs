@@ -147,6 +147,9 @@ impl Leg {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Route {
+    /// The building whose frame the world is, if it is one's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub building: Option<String>,
     /// Where the person stands at first. **Units:** m; **Frame:** world, z up.
     pub start: [f64; 3],
     /// Where the person faces at first. **Units:** rad; **Frame:** world, counter-clockwise from x.

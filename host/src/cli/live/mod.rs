@@ -1,0 +1,185 @@
+//! `sohle live`: a shoe's steps as they come, and everything it says in a recording.
+
+mod places;
+mod show;
+mod words;
+
+use super::located::InBuilding;
+use super::{Error, parameters};
+use crate::calibration;
+use crate::link::recorder::Recorder;
+use crate::link::{Address, Connection};
+use crate::recording::live::{CALIBRATION, PARAMETERS};
+use clap::ValueEnum;
+use places::Places;
+use show::Show;
+use sohle_shared::tracker::Order;
+use sohle_shared::wire::message::Action;
+use sohle_shared::wire::transfer::{Item, Value};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+/// Shows a shoe's steps as they come and records what it says
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Ctrl-C ends it. The port is opened anew as often as needed; steps that the shoe made meanwhile follow then.\n\
+'sohle replay' takes the recording; with --raw it computes the steps again from the sensor's counts and tells whether\n\
+they are the same.\n\n\
+Examples:\n  sohle live serial:/dev/ttyACM0\n  sohle live tcp:127.0.0.1:7700 --raw --out walk.mcap\n  \
+sohle live serial:/dev/ttyACM0 --building buildings/twin.geojson --start entrances --serve 8765"
+)]
+pub struct Args {
+    /// Where the shoe is: a serial port, at 921600 baud unless it says otherwise, or a network port
+    #[arg(value_name = "serial:PATH[@BAUD]|tcp:HOST:PORT")]
+    address: Address,
+    /// The recording [default: sohle-live-TIME.mcap]
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "no_record")]
+    out: Option<PathBuf>,
+    /// Records nothing
+    #[arg(long)]
+    no_record: bool,
+    /// Records the counts of the sensor at its full rate too; the shoe's tracker starts anew for it
+    #[arg(long, conflicts_with = "no_record")]
+    raw: bool,
+    /// Gives the shoe these settings of its tracker first
+    #[arg(long, value_name = "FILE.toml")]
+    parameters: Option<PathBuf>,
+    /// Gives the shoe this calibration of its sensor first
+    #[arg(long, value_name = "FILE.toml")]
+    calibration: Option<PathBuf>,
+    /// Ends after so many seconds
+    #[arg(long = "for", value_name = "SECONDS")]
+    duration: Option<f64>,
+    /// Ends after so many steps
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+    /// How steps and summary are told
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+    #[command(flatten)]
+    place: InBuilding,
+    /// Draws the floors with the walk into this folder at the end
+    #[arg(long, value_name = "DIR", requires = "building")]
+    pictures: Option<PathBuf>,
+    /// Tells nothing but the summary and errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// A line for each step, for people
+    #[default]
+    Table,
+    /// A JSON object in each line
+    Json,
+}
+
+/// How soon Ctrl-C is noticed.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Connects, shows, records.
+pub fn run(args: Args) -> Result<(), Error> {
+    let mut values = Vec::new();
+    if let Some(path) = &args.parameters {
+        values.push(Value::Parameters(parameters::read(path)?));
+    }
+    if let Some(path) = &args.calibration {
+        values.push(Value::Calibration(calibration::read(path)?));
+    }
+    let until = match args.duration {
+        Some(seconds) if !(seconds > 0.0 && seconds < 1e9) => {
+            return Err(Error::new(format!("--for {seconds}: expected more than 0 seconds")));
+        }
+        seconds => seconds.map(|seconds| Instant::now() + Duration::from_secs_f64(seconds)),
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = stop.clone();
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
+
+    let places = Places::prepare(&args.place)?;
+    let recorder = if args.no_record { None } else { Some(begin(args.out.as_deref())?) };
+    let opened = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    let mut connection = Connection::open(args.address.clone());
+    let opened_us = i64::try_from(opened.as_micros()).unwrap_or_default();
+    let mut show = Show::new(&args, recorder, places, opened_us);
+    show.head()?;
+    let mut prepared = None;
+    let result = loop {
+        let enough = args.steps.is_some_and(|steps| show.steps >= steps);
+        if enough || stop.load(Ordering::Relaxed) || until.is_some_and(|until| Instant::now() >= until) {
+            break Ok(());
+        }
+        if let Some(fault) = show.fault.take() {
+            break Err(Error::new(fault));
+        }
+        if show.boot.is_some() && show.boot != prepared {
+            prepared = show.boot;
+            if let Err(error) = prepare(&mut connection, &mut show, &values, args.raw) {
+                break Err(error);
+            }
+            // What an earlier program told it, or the reset took away.
+            show.shoe_forgot();
+        }
+        if show.boot.is_some()
+            && let Some(mode) = show.mode_due()
+        {
+            let number = connection.tell(Action::Order(Order::FloorMode(mode)));
+            show.mode_sent(number, mode);
+        }
+        if let Some(happening) = connection.next(LOOK) {
+            show.take(happening, &connection);
+        }
+    };
+    if show.places.as_ref().is_some_and(Places::holds_a_mode) && result.is_ok() {
+        // Who is not followed any more decides alone; a shoe that does not hear it is freed by the next program.
+        let free = Action::Order(Order::FloorMode(None));
+        let _ = connection.ask(free, &mut |happening, connection| show.take(happening, connection));
+    }
+    if args.raw && show.boot.is_some() && result.is_ok() {
+        // If the shoe does not hear it, the next program that says hello ends it.
+        let _ = connection.ask(Action::Raw(false), &mut |happening, connection| show.take(happening, connection));
+    }
+    show.finish(&connection)?;
+    result
+}
+
+fn begin(path: Option<&Path>) -> Result<Recorder, Error> {
+    let path = path.map_or_else(
+        || {
+            let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+            PathBuf::from(format!("sohle-live-{}.mcap", since.as_secs()))
+        },
+        Path::to_path_buf,
+    );
+    // What was heard once comes never again.
+    if path.is_file() {
+        return Err(Error::new(format!("{} is there already; a live recording replaces nothing", path.display())));
+    }
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Recorder::begin(&path, &name)?)
+}
+
+/// Gives a shoe that has just started what it is to have, and turns raw counts on.
+fn prepare(connection: &mut Connection, show: &mut Show, values: &[Value], raw: bool) -> Result<(), Error> {
+    for value in values {
+        connection.write(value, &mut |happening, connection| show.take(happening, connection))?;
+    }
+    if !raw {
+        return Ok(());
+    }
+    for item in [Item::Parameters, Item::Calibration] {
+        let value = connection.read(item, &mut |happening, connection| show.take(happening, connection))?;
+        let (key, text) = match value {
+            Value::Parameters(parameters) => (PARAMETERS, toml::to_string(&parameters)?),
+            Value::Calibration(calibration) => (CALIBRATION, toml::to_string(&calibration)?),
+        };
+        if let Some(recorder) = &mut show.recorder {
+            recorder.about(key, text);
+        }
+    }
+    connection.ask(Action::Raw(true), &mut |happening, connection| show.take(happening, connection))?;
+    Ok(())
+}

@@ -1,0 +1,148 @@
+//! The steps of a live shoe in a building: followed as they come, and the shoe is told its floor mode.
+
+use crate::cli::located::{Following, InBuilding};
+use crate::cli::{Error, live::words};
+use crate::follow::{mode_word, scene};
+use crate::link::Connection;
+use crate::link::ground::ShoeMode;
+use crate::recording::scene::{Lines, Moment};
+use serde_json::{Value as Json, json};
+use sohle_shared::step::{FloorMode, Step};
+use sohle_shared::wire::message::Outcome;
+use std::path::Path;
+
+/// Steps that may wait for the clock of the shoe to be known. They come first when the line is good; a clock that is still not
+/// known then is not waited for.
+const WAITING: usize = 64;
+
+/// Follows a live shoe.
+pub struct Places {
+    following: Following,
+    shoe: ShoeMode,
+    /// Whether the walk begins somewhere, now.
+    starts_here: bool,
+    waiting: Vec<Step>,
+    before: u64,
+    unusual: u64,
+}
+
+/// What is said after a step: for people and for programs.
+pub struct Told {
+    pub text: String,
+    pub object: Json,
+    pub moment: Moment,
+}
+
+impl Places {
+    /// Reads the building and the start, if a building is asked for.
+    pub fn prepare(place: &InBuilding) -> Result<Option<Self>, Error> {
+        let following = place.prepare()?;
+        Ok(following.map(|following| Self {
+            following,
+            shoe: ShoeMode::default(),
+            starts_here: place.how.starts_somewhere(),
+            waiting: Vec::new(),
+            before: 0,
+            unusual: 0,
+        }))
+    }
+
+    /// Takes a step in, and tells of all whose time is known by now.
+    pub fn step(&mut self, step: &Step, opened_us: i64, connection: &Connection) -> Vec<Told> {
+        self.waiting.push(*step);
+        self.known(opened_us, connection)
+    }
+
+    /// Tells of the steps whose time has become known.
+    pub fn known(&mut self, opened_us: i64, connection: &Connection) -> Vec<Told> {
+        let clock = connection.session().clock();
+        let known = clock.to_host(step_end(self.waiting.first())).is_some();
+        if !known && self.waiting.len() < WAITING {
+            return Vec::new();
+        }
+        let steps = std::mem::take(&mut self.waiting);
+        steps
+            .iter()
+            .filter_map(|step| self.follow(step, clock.to_host(step.stance_end).map(|time| time.0), opened_us))
+            .collect()
+    }
+
+    /// `host_us`: the end of the step, counted from when the program began.
+    fn follow(&mut self, step: &Step, host_us: Option<i64>, opened_us: i64) -> Option<Told> {
+        // The start is where the person stood when the program began: an earlier step led there, not away from it.
+        if self.starts_here && host_us.is_some_and(|host| host < 0) {
+            self.before += 1;
+            return None;
+        }
+        let (said, object) = self.following.step(step, host_us.map(|host| opened_us + host));
+        self.unusual += u64::from(said.unusual.is_some());
+        self.shoe.want(said.mode);
+        let moment = scene::moment(self.following.follower(), &said, object.to_string());
+        Some(Told { text: words::place(&said), object, moment })
+    }
+
+    /// The plan, for viewers.
+    pub fn plan(&self) -> Vec<Lines> {
+        scene::building(self.following.follower().building())
+    }
+
+    /// The floor mode that is to be sent to the shoe now, if one is.
+    pub fn mode_due(&self) -> Option<Option<FloorMode>> {
+        if self.following.steers() { self.shoe.due() } else { None }
+    }
+
+    /// It was sent as the command of this number.
+    pub fn mode_sent(&mut self, number: u32, mode: Option<FloorMode>) {
+        self.shoe.sent(number, mode);
+    }
+
+    /// A command was answered; what there is to tell of it.
+    pub fn answered(&mut self, number: u32, outcome: &Outcome) -> Option<String> {
+        let (mode, taken) = self.shoe.answered(number, outcome)?;
+        let word = mode_word(mode);
+        Some(if taken {
+            format!("the shoe takes the ground for: {word}")
+        } else {
+            format!("the shoe refuses the floor mode {word}; it decides alone")
+        })
+    }
+
+    /// The tracker of the shoe is as new.
+    pub fn shoe_forgot(&mut self) {
+        self.shoe.forgotten();
+    }
+
+    /// Whether the shoe holds a mode that it is to be freed from at the end.
+    pub fn holds_a_mode(&self) -> bool {
+        self.shoe.holds_a_mode()
+    }
+
+    /// For the summary.
+    pub fn summary(&self) -> Json {
+        let estimate = self.following.follower().estimate();
+        json!({
+            "state": estimate.state, "followed": self.following.follower().path().len(), "before_start": self.before,
+            "unusual": self.unusual, "floor_modes_told": self.shoe.told,
+        })
+    }
+
+    /// Ends it: steps whose time never became known, the tracks, the pictures. What there is to tell.
+    pub fn finish(mut self, pictures: Option<&Path>, opened_us: i64) -> Result<String, Error> {
+        for step in std::mem::take(&mut self.waiting) {
+            self.follow(&step, None, opened_us);
+        }
+        let before = match self.before {
+            0 => String::new(),
+            before => format!("{before} steps from before the start were not followed\n"),
+        };
+        if self.following.follower().path().is_empty() {
+            self.following.abandon()?;
+            return Ok(format!("{before}no step was followed in the building\n"));
+        }
+        Ok(format!("{before}{}", self.following.finish(None, pictures)?))
+    }
+}
+
+fn step_end(step: Option<&Step>) -> sohle_shared::time::Micros {
+    step.map_or(sohle_shared::time::Micros(0), |step| step.stance_end)
+}

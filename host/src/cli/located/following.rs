@@ -1,0 +1,130 @@
+//! Somebody who is followed, and where what is said of it goes.
+
+use super::outputs::{Outputs, Wanted, walk};
+use super::{picture, summary};
+use crate::building::georeference::Projection;
+use crate::cli::{Error, print};
+use crate::export::{file, png};
+use crate::follow::{self, Follower, LONGEST_STEP_M, Said, Unusual, scene};
+use crate::recording::Recording;
+use crate::recording::scene::{Lines, Moment};
+use serde_json::Value;
+use sohle_shared::step::Step;
+use std::path::Path;
+
+/// The estimate after each step, a JSON object to a line.
+const STREAM: &str = "places.jsonl";
+
+/// A follower and its outputs.
+pub struct Following {
+    follower: Follower,
+    projection: Option<Projection>,
+    outputs: Outputs,
+    /// The date of each step, where it is known. **Units:** microseconds since the beginning of 1970.
+    unix_us: Vec<Option<i64>>,
+    /// The lines that were handed on, when they are kept for the folder of results.
+    lines: Option<String>,
+    /// What viewers show, when it is kept for the recording.
+    moments: Option<Vec<Moment>>,
+}
+
+impl Following {
+    /// Of somebody who has not gone yet.
+    pub fn new(follower: Follower, wanted: &Wanted) -> Result<Self, Error> {
+        let projection = follower.building().georeference.projection()?;
+        let outputs = wanted.open(projection.as_ref())?;
+        Ok(Self { follower, projection, outputs, unix_us: Vec::new(), lines: None, moments: None })
+    }
+
+    /// Keeps the lines, for [`Following::finish`] to write them into its folder, and what viewers show.
+    pub fn keeping_all(mut self) -> Self {
+        self.lines = Some(String::new());
+        self.moments = Some(Vec::new());
+        self
+    }
+
+    /// What viewers show of it: the plan, and the moments that were kept.
+    pub fn shown(&self) -> (Vec<Lines>, &[Moment]) {
+        (scene::building(self.follower.building()), self.moments.as_deref().unwrap_or_default())
+    }
+
+    /// The follower.
+    pub fn follower(&self) -> &Follower {
+        &self.follower
+    }
+
+    /// Follows a step, and hands on what is said, which is also the second answer, as JSON. `unix_us` is the date of its end, if that
+    /// is known. **Units:** microseconds since the beginning of 1970.
+    pub fn step(&mut self, step: &Step, unix_us: Option<i64>) -> (Said, Value) {
+        let said = self.follower.step(step);
+        match said.unusual {
+            Some(Unusual::TooLong(length)) => eprintln!(
+                "step {}: {length:.1} m is longer than any stride ({LONGEST_STEP_M} m); taken for a hole in the walk",
+                step.index
+            ),
+            Some(Unusual::NoNumber) => eprintln!("step {}: is no number; passed over", step.index),
+            None => {}
+        }
+        self.unix_us.push(unix_us);
+        let mut object = follow::line(&self.follower, &said, self.projection.as_ref());
+        object["unix_us"] = unix_us.into();
+        let line = object.to_string();
+        self.outputs.line(&line);
+        if let Some(lines) = &mut self.lines {
+            *lines += &line;
+            lines.push('\n');
+        }
+        if let Some(moments) = &mut self.moments {
+            moments.push(scene::moment(&self.follower, &said, line));
+        }
+        (said, object)
+    }
+
+    /// Whether the shoe is to be told its floor mode.
+    pub fn steers(&self) -> bool {
+        self.follower.steers()
+    }
+
+    /// Ends it where there was nothing to follow: tracks without a place, farewell to the clients.
+    pub fn abandon(self) -> Result<(), Error> {
+        let Self { follower, projection, outputs, unix_us, .. } = self;
+        outputs.finish(&walk(&follower, &unix_us, projection.as_ref()))
+    }
+
+    /// Writes the tracks that were asked for and, with a folder, the pictures of the floors; returns what there is to tell.
+    pub fn finish(self, recording: Option<&Recording>, folder: Option<&Path>) -> Result<String, Error> {
+        let Self { follower, projection, outputs, unix_us, lines, .. } = self;
+        outputs.finish(&walk(&follower, &unix_us, projection.as_ref()))?;
+        if follower.path().is_empty() {
+            return Err(Error::new("there are no steps to follow in the building"));
+        }
+        let truth = recording.and_then(|recording| summary::truth(&follower, recording));
+        let mut told = summary::told(&follower);
+        if let Some(truth) = truth {
+            told += &format!("\n{}", summary::judged(&follower, truth));
+        }
+        let Some(folder) = folder else { return Ok(told) };
+        file::folder(folder)?;
+        let mut files = Vec::new();
+        if let Some(lines) = lines {
+            file::write(&folder.join(STREAM), lines.as_bytes())?;
+            files.push(STREAM.to_owned());
+        }
+        let way: Vec<_> = truth.into_iter().flat_map(|truth| &truth.poses).map(|pose| pose.position).collect();
+        for (index, floor) in follower.building().floors.iter().enumerate() {
+            let drawing = picture::draw(&follower, index, &way);
+            let name = |kind: &str| format!("floor{}.{kind}", floor.number);
+            file::write(&folder.join(name("svg")), drawing.as_bytes())?;
+            file::write(&folder.join(name("png")), &png::render(&drawing)?)?;
+            files.extend([name("svg"), name("png")]);
+        }
+        told += &format!("\n{}: {}\n", folder.display(), files.join(", "));
+        Ok(told)
+    }
+}
+
+/// The same, told on the standard output unless `quiet`.
+pub fn finish_and_tell(following: Following, recording: &Recording, folder: &Path, quiet: bool) -> Result<(), Error> {
+    let told = following.finish(Some(recording), Some(folder))?;
+    if quiet { Ok(()) } else { print(&format!("\n{told}")) }
+}
