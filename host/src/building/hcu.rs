@@ -2,14 +2,17 @@
 //! polygons with IFC classes.
 //!
 //! Walls and facades are solid: their borders are walls. Doors lie in walls as polygons of their own; what of a wall lies
-//! within a door is taken out. Spaces are rooms; staircases and elevators join floors where they lie above each other.
+//! lies
+//! along a door is taken out. Spaces are rooms; staircases and elevators join floors where they lie above each other.
 
 use super::error::Error;
 use super::features::{self, RawFeature};
 use super::geojson::project;
-use super::geometry::{self, Outline, Point, Segment};
+use super::geometry::{self, Point, Segment};
 use super::georeference::Georeference;
-use super::model::{Building, Connector, ConnectorKind, Door, Floor, Room};
+use super::model::{Building, ConnectorKind, Door, Floor, Room};
+use super::opening::{self, Opening};
+use super::stacked::{self, Part};
 
 /// A floor file.
 #[derive(Clone, Debug)]
@@ -28,8 +31,6 @@ pub struct FloorFile<'a> {
 
 /// Doors reach so far beyond the walls that they open. **Units:** m.
 const DOOR_REACH_M: f64 = 0.12;
-/// Centres of a staircase on two floors are no farther apart. **Units:** m.
-const ABOVE_M: f64 = 4.0;
 
 /// The building of some floors. The origin is a corner of the first.
 ///
@@ -37,6 +38,7 @@ const ABOVE_M: f64 = 4.0;
 /// When a text is no GeoJSON of this dialect, or the floors do not make a building.
 pub fn parse(name: &str, files: &[FloorFile<'_>]) -> Result<Building, Error> {
     let mut building = Building { name: name.to_owned(), ..Building::default() };
+    let mut stairs = Vec::new();
     for file in files {
         let mut features = features::features(features::collection(file.text, file.file)?, file.file)?;
         if building.georeference == Georeference::Local {
@@ -50,17 +52,16 @@ pub fn parse(name: &str, files: &[FloorFile<'_>]) -> Result<Building, Error> {
             }
         }
         building.floors.push(floor(file, &features)?);
-        connect(&mut building.connectors, file.number, &features);
+        stairs.extend(parts(file.number, &features));
     }
-    // What is on one floor only joins nothing.
-    building.connectors.retain(|connector| connector.outlines.len() > 1);
+    building.connectors = stacked::join(stairs)?;
     building.assembled()
 }
 
 fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> {
     let mut floor =
         Floor { number: file.number, name: file.name.to_owned(), height_m: file.height_m, ..Floor::default() };
-    let mut doors: Vec<Outline> = Vec::new();
+    let mut doors: Vec<Opening> = Vec::new();
     for feature in features {
         let class = feature.text("ifc_class").ok_or_else(|| feature.error(file.file, "it has no 'ifc_class'"))?;
         let outlines =
@@ -73,7 +74,7 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
                 for outline in outlines {
                     if let Some(line) = geometry::middle_line(outline) {
                         floor.doors.push(Door { line, name: feature.text("spaceID").filter(|name| name != "Door") });
-                        doors.push(grown(outline, DOOR_REACH_M));
+                        doors.push(Opening { line, depth_m: thickness(outline, &line) / 2.0 + DOOR_REACH_M });
                     }
                 }
             }
@@ -88,60 +89,34 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
             }
         }
     }
-    for door in &doors {
-        let Some([low, high]) = geometry::bounds(door.iter().copied()) else { continue };
-        let near = |wall: &Segment| {
-            (0..2).all(|axis| {
-                wall[0][axis].min(wall[1][axis]) <= high[axis] && wall[0][axis].max(wall[1][axis]) >= low[axis]
-            })
-        };
-        let (cut, kept): (Vec<Segment>, Vec<Segment>) = floor.walls.iter().partition(|wall| near(wall));
-        floor.walls = kept;
-        floor.walls.extend(cut.iter().flat_map(|wall| geometry::outside_of(wall, door)));
-    }
+    floor.walls = opening::cut(&floor.walls, &doors);
     Ok(floor)
 }
 
-/// An outline whose corners are moved away from its middle.
-fn grown(outline: &[Point], by: f64) -> Outline {
-    let middle = geometry::centre(outline);
-    let away = |point: &Point| {
-        let far = geometry::distance(middle, *point).max(1e-6);
-        geometry::between(middle, *point, 1.0 + by / far)
-    };
-    outline.iter().map(away).collect()
+/// How thick an outline is across a line along it.
+fn thickness(outline: &[Point], line: &Segment) -> f64 {
+    let length = geometry::length(line).max(1e-6);
+    let across = [-(line[1][1] - line[0][1]) / length, (line[1][0] - line[0][0]) / length];
+    let places = outline.iter().map(|point| point[0] * across[0] + point[1] * across[1]);
+    let (low, high) =
+        places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), place| (low.min(place), high.max(place)));
+    high - low
 }
 
-/// Joins staircases and elevators with those of the floors before.
-fn connect(connectors: &mut Vec<Connector>, floor: i32, features: &[RawFeature]) {
-    for feature in features {
+/// Staircases and elevators of a floor.
+fn parts(floor: i32, features: &[RawFeature]) -> impl Iterator<Item = Part> {
+    features.iter().flat_map(move |feature| {
         let usage = feature.text("usage").unwrap_or_default().to_lowercase();
         let kind = match &usage[..] {
-            "staircase" | "stairs" | "srairs" => ConnectorKind::Stairs,
-            "elevator" => ConnectorKind::Elevator,
-            _ => continue,
+            "staircase" | "stairs" | "srairs" => Some(ConnectorKind::Stairs),
+            "elevator" => Some(ConnectorKind::Elevator),
+            _ => None,
         };
-        for outline in feature.polygons.iter().filter_map(|polygon| polygon.first()).filter(|outline| outline.len() > 2)
-        {
-            let middle = geometry::centre(outline);
-            let above = connectors.iter_mut().find(|connector| {
-                let last = connector.outlines.last();
-                connector.kind == kind
-                    && last.is_some_and(|(other, below)| {
-                        *other != floor && geometry::distance(geometry::centre(below), middle) < ABOVE_M
-                    })
-            });
-            match above {
-                Some(connector) => connector.outlines.push((floor, outline.clone())),
-                None => connectors.push(Connector {
-                    name: format!("{}-{}", kind.word(), connectors.len() + 1),
-                    kind,
-                    outlines: vec![(floor, outline.clone())],
-                    way: Vec::new(),
-                }),
-            }
-        }
-    }
+        let outlines = feature.polygons.iter().filter_map(|polygon| polygon.first());
+        let outlines = outlines.filter(|outline| outline.len() > 2).cloned();
+        kind.into_iter()
+            .flat_map(move |kind| outlines.clone().map(move |outline| Part { floor, kind, name: None, outline }))
+    })
 }
 
 #[cfg(test)]
@@ -171,8 +146,8 @@ mod tests {
         let building = parse("house", &[file]).unwrap();
         let floor = &building.floors[0];
         let total: f64 = floor.walls.iter().map(geometry::length).sum();
-        // Both long sides lose the door and its reach on both sides of it.
-        assert!((total - (2.0 * 8.9 + 2.0 * 0.2 - 2.0 * (0.9 + 2.0 * DOOR_REACH_M))).abs() < 0.1, "{total}");
+        // Both long sides lose the door; the degrees above are metres to a percent.
+        assert!((total - (2.0 * 8.9 + 2.0 * 0.2 - 2.0 * 0.9)).abs() < 0.1, "{total}");
         assert!((geometry::length(&floor.doors[0].line) - 0.9).abs() < 0.01);
         assert_eq!((floor.rooms[0].name.as_str(), floor.rooms[0].usage.as_deref()), ("4 001", Some("Office")));
         assert!(matches!(building.georeference, Georeference::Utm { epsg: 32_632, .. }));

@@ -15,10 +15,17 @@ pub mod geojson;
 pub mod geometry;
 pub mod georeference;
 pub mod hcu;
+mod index;
+pub mod merge;
 mod model;
 pub mod open;
+pub mod opening;
+pub mod osm;
 pub mod picture;
 pub mod route;
+#[cfg(test)]
+mod same;
+mod stacked;
 pub mod xyz10;
 
 pub use error::Error;

@@ -217,7 +217,8 @@ impl Building {
 /// The farthest from the origin that a building reaches. **Units:** m.
 const FARTHEST_M: f64 = 5_000.0;
 
-fn is_place(point: &Point) -> bool {
+/// Whether a point is a place of a building.
+pub(super) fn is_place(point: &Point) -> bool {
     // Written so that no number is no place.
     point.iter().all(|value| value.abs() <= FARTHEST_M)
 }

@@ -3,7 +3,6 @@
 //! What is looked at and from where on it is an error is told by [`Kind`]. A finding is an error if a person who walks
 //! correctly would be taken for lost there, and a warning if it only costs or confuses.
 
-mod index;
 mod reach;
 mod shape;
 mod walls;

@@ -1,9 +1,9 @@
 //! Whether one gets everywhere: floors are divided into small cells, and from the entrances a flood goes through doors
 //! and openings, up and down stairs and elevators.
 
-use super::index::pieces;
 use super::{Kind, Notes};
 use crate::building::geometry::{self, Point};
+use crate::building::index::pieces;
 use crate::building::model::{Building, Connector, Floor};
 
 /// Side of a cell: a door of 0.6 m has room for three. **Units:** m.

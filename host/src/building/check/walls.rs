@@ -1,8 +1,8 @@
 //! Gaps between walls, walls drawn twice, walls through doors.
 
-use super::index::Index;
 use super::{Kind, Notes};
 use crate::building::geometry::{self, Point, Segment};
+use crate::building::index::Index;
 use crate::building::model::{Building, Floor};
 
 /// Ends nearer than this meet. **Units:** m.
