@@ -226,15 +226,11 @@ pub fn write(building: &Building) -> Result<String, Error> {
     let place = Placer { projection: building.georeference.projection()? };
     let mut features = Vec::new();
     for floor in &building.floors {
-        features.push(feature(
-            "wall",
-            floor.number,
-            None,
-            json!({
-                "type": "MultiLineString",
-                "coordinates": place.lines(&floor.walls)?,
-            }),
-        ));
+        // A feature without lines could not be read again.
+        if !floor.walls.is_empty() {
+            let geometry = json!({"type": "MultiLineString", "coordinates": place.lines(&floor.walls)?});
+            features.push(feature("wall", floor.number, None, geometry));
+        }
         for door in &floor.doors {
             let line = door.line.iter().map(|point| place.point(*point)).collect::<Result<Vec<_>, _>>()?;
             let geometry = json!({"type": "LineString", "coordinates": line});
@@ -415,7 +411,7 @@ mod tests {
     }
 
     fn any_floor() -> impl Strategy<Value = Floor> {
-        let wall = prop::collection::vec((place(), place()).prop_map(|(a, b)| [a, b]), 1..6);
+        let wall = prop::collection::vec((place(), place()).prop_map(|(a, b)| [a, b]), 0..6);
         let door = (place(), place(), prop::option::of("[a-z]{1,4}"));
         let doors = prop::collection::vec(door.prop_map(|(a, b, name)| Door { line: [a, b], name }), 0..4);
         let outline = prop::collection::vec(place(), 3..7).prop_filter("open", |ring| ring.first() != ring.last());
