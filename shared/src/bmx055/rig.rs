@@ -244,6 +244,32 @@ mod tests {
     }
 
     #[test]
+    fn no_frame_of_a_die_that_was_reset_is_handed_out() {
+        for die in [Die::Accel, Die::Gyro] {
+            let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, timed));
+            let mut config = Config::default();
+            // What is read after a reset is one frame, as long as the FIFO is off.
+            (config.accel.watermark, config.gyro.watermark) = (1, 1);
+            let mut rig = Rig::new(&twin, &config);
+            twin.borrow_mut().set_temperature(10);
+            for _ in 0..8 {
+                rig.run(201_300);
+                let reset = rig.now.max(twin.borrow().now());
+                twin.borrow_mut().interrupt_supply(die);
+                while rig.driver.state(die) == State::Run {
+                    rig.run(500);
+                }
+                while rig.driver.state(die) != State::Run {
+                    rig.run(500);
+                }
+                let between = |frame: &[i16; 3]| (reset.0..rig.now.0 - 500).contains(&number(frame));
+                assert_eq!(rig.frames(die).into_iter().find(between), None, "{die:?}, reset at {reset:?}");
+            }
+            assert!(rig.batches.iter().all(|batch| batch.temperature.is_none_or(|read| read == 10)));
+        }
+    }
+
+    #[test]
     fn a_bus_error_costs_a_batch_at_most_and_never_the_other_die() {
         let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, numbered()));
         let mut rig = Rig::new(&twin, &Config::default());
