@@ -59,6 +59,17 @@ const MARGIN: usize = 4;
 /// it is read: one that still has a watermark then does not count its frames.
 const ROUNDS_MAX: usize = 8;
 
+/// What came of a burst.
+enum Burst {
+    /// Its frames were handed out.
+    Whole,
+    /// The die was reset before its end: it is none of ours.
+    Reset,
+    /// The FIFO ran over before its end: the oldest frame made room for the newest while it was read, and what was read after
+    /// that is out of step.
+    Torn,
+}
+
 /// A die and what is known of it.
 #[derive(Debug)]
 pub(super) struct Channel<SPI> {
@@ -367,25 +378,37 @@ impl<SPI: SpiDevice> Channel<SPI> {
             self.fail(now);
             return Ok(());
         }
-        self.lost |= overrun;
+        if overrun {
+            return self.start_over(now, delay).await;
+        }
         let mut left = frames;
         while left > 0 {
             let next = left.min(BATCH_FRAMES);
             left -= next;
             // The last frame may have come after `now` was read from the clock.
             let stamp = now + (self.period_us - self.span_us(left, true));
-            if !self.read(next, stamp, temperature, sink).await? {
-                self.restart(now);
-                return Ok(());
+            match self.read(next, stamp, temperature, sink).await? {
+                Burst::Whole => {}
+                Burst::Reset => {
+                    self.restart(now);
+                    return Ok(());
+                }
+                Burst::Torn => return self.start_over(now, delay).await,
             }
         }
-        if overrun {
-            self.counters.overruns = self.counters.overruns.saturating_add(1);
-            // The only way to take back the mark; frames that came in the meantime go with it.
-            self.lost = true;
-            port::write(&mut self.spi, both::FIFO_CONFIG_1, both::FIFO_STREAM).await?;
-            delay.delay_us(WRITE_US).await;
-        }
+        self.last = now + -self.period_us;
+        self.overdue = now + self.patience_us;
+        Ok(())
+    }
+
+    /// Empties a FIFO that has run over. Nothing in it is handed out: while it is full, every new frame takes the place of the
+    /// oldest, also of one that is being read.
+    async fn start_over(&mut self, now: Micros, delay: &mut impl DelayNs) -> Result<(), Error> {
+        self.counters.overruns = self.counters.overruns.saturating_add(1);
+        self.lost = true;
+        // The only way to take back the mark.
+        port::write(&mut self.spi, both::FIFO_CONFIG_1, both::FIFO_STREAM).await?;
+        delay.delay_us(WRITE_US).await;
         self.last = now + -self.period_us;
         self.overdue = now + self.patience_us;
         Ok(())
@@ -423,9 +446,16 @@ impl<SPI: SpiDevice> Channel<SPI> {
                 return Ok(());
             }
             while frames >= self.watermark {
-                if !self.read(self.watermark, stamp, temperature, sink).await? {
-                    self.restart(now);
-                    return Ok(());
+                match self.read(self.watermark, stamp, temperature, sink).await? {
+                    Burst::Whole => {}
+                    Burst::Reset => {
+                        self.restart(now);
+                        return Ok(());
+                    }
+                    Burst::Torn => {
+                        (self.retry, self.overdue) = (true, stamp);
+                        return Ok(());
+                    }
                 }
                 frames -= self.watermark;
                 self.last = stamp;
@@ -446,22 +476,25 @@ impl<SPI: SpiDevice> Channel<SPI> {
         Ok((usize::from(status & !both::FIFO_OVERRUN), status & both::FIFO_OVERRUN != 0))
     }
 
-    /// Reads `count` frames, at most [`BATCH_FRAMES`], in one burst; the last came at `stamp`. Whether they are the die's as it
-    /// was set up: if not, none is handed out.
+    /// Reads `count` frames, at most [`BATCH_FRAMES`], in one burst; the last came at `stamp`. They are handed out if
+    /// they are whole, and of the die as it was set up.
     async fn read(
         &mut self,
         count: usize,
         stamp: Micros,
         temperature: Option<i8>,
         sink: &mut impl FnMut(&Batch),
-    ) -> Result<bool, Error> {
+    ) -> Result<Burst, Error> {
         let mut bytes = [0; FRAME * BATCH_FRAMES];
         let bytes = bytes.get_mut(..FRAME * count).unwrap_or_default();
         // Until all is known to be well, some of the frames may be gone.
         let lost = core::mem::replace(&mut self.lost, true);
         port::read(&mut self.spi, both::FIFO_DATA, bytes).await?;
         if self.was_reset().await? {
-            return Ok(false);
+            return Ok(Burst::Reset);
+        }
+        if self.stored().await?.1 {
+            return Ok(Burst::Torn);
         }
         self.lost = lost;
         let mut valid = 0;
@@ -486,7 +519,7 @@ impl<SPI: SpiDevice> Channel<SPI> {
         self.counters.frames = self.counters.frames.saturating_add(valid);
         // A die that gives nothing but marks of emptiness is broken.
         self.failures = if valid > 0 { 0 } else { self.failures.saturating_add(1) };
-        Ok(true)
+        Ok(Burst::Whole)
     }
 
     /// Hands frames out if there are any.

@@ -208,6 +208,8 @@ mod tests {
         accel.extend(reads(0x0E, &[0x02]));
         accel.extend(reads(0x3F, &[0x11, 0x00, 0xEF, 0xFF, 0x0F, 0x80, 0xFF, 0x7F, 0x00, 0x00, 0x1E, 0x00]));
         accel.extend(reads(0x17, &[0x40]));
+        // It has not run over meanwhile.
+        accel.extend(reads(0x0E, &[0x00]));
         // None is left, but the line may have stayed high.
         accel.extend(reads(0x0E, &[0x00]));
         let gyro = cold_start(
