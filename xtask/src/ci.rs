@@ -2,7 +2,7 @@
 
 use crate::process::{self, Failure};
 use crate::stage::{Run, Tally};
-use crate::{bench, check, determinism, device, emulate, emulator, firmware, tools};
+use crate::{bench, check, determinism, device, emulate, emulator, firmware, fuzz, tools};
 use std::process::Command;
 
 /// How to run the checks.
@@ -32,6 +32,13 @@ pub fn run(arguments: &Arguments) -> bool {
     });
     run.stage("tests", tests);
     run.stage("documentation tests", || counted(cargo("test --locked --workspace --all-features --doc")));
+    run.check("fuzz lint", || {
+        // With the folder of the others, most of it is built already.
+        process::run(&mut cargo(
+            "clippy --locked --manifest-path fuzz/Cargo.toml --target-dir target --all-targets -- -D warnings",
+        ))
+    });
+    run.check("fuzzing", fuzz::check);
     run.check("no_std build", device::build_shared);
     run.check("firmware lint", firmware::lint);
     run.check("firmware", || firmware::run(&firmware::Arguments::default()));

@@ -9,6 +9,7 @@ mod device;
 mod emulate;
 mod emulator;
 mod firmware;
+mod fuzz;
 mod process;
 mod recordings;
 mod stage;
@@ -44,6 +45,8 @@ enum Command {
     Bench,
     /// Evaluates in debug and release builds, on one and two threads: the outputs must be the same.
     Determinism,
+    /// Gives arbitrary input to everything that reads what others wrote; exit code 1 when a promise is broken.
+    Fuzz(fuzz::Arguments),
     /// Fetches the recordings of the manifest from their upstream repositories.
     Recordings(recordings::Arguments),
     /// Checks what is committed: no data, licences of the dependencies, the changelog.
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Command::Flash(arguments) => firmware::flash(&arguments),
         Command::Bench => bench::run(),
         Command::Determinism => determinism::run(),
+        Command::Fuzz(arguments) => fuzz::run(&arguments),
         Command::Recordings(arguments) => recordings::run(&arguments),
         Command::Check => check::run(),
         Command::Install => tools::install(&tools::ALL),

@@ -38,11 +38,14 @@ pub const DEBIAN_CLIPPY: Tool = Tool {
     packages: &["rust-web-clippy"],
 };
 
+/// Compiler of the fuzzer, which is written in C++.
+pub const CXX: Tool = Tool { what: "a C++ compiler", present_by: &["c++"], packages: &["g++"] };
+
 /// Linker for the microcontroller, with the compiler above.
 pub const LLD: Tool = Tool { what: "the linker lld", present_by: &["ld.lld"], packages: &["lld"] };
 
 /// Everything.
-pub const ALL: [Tool; 6] = [QEMU, VALGRIND, CURL, DEBIAN_RUST, DEBIAN_CLIPPY, LLD];
+pub const ALL: [Tool; 7] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD];
 
 impl Tool {
     /// Whether the machine has it.

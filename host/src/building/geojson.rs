@@ -226,7 +226,7 @@ pub fn write(building: &Building) -> Result<String, Error> {
     let place = Placer { projection: building.georeference.projection()? };
     let mut features = Vec::new();
     for floor in &building.floors {
-        // Lines of nothing would be no lines.
+        // A feature without lines could not be read again.
         if !floor.walls.is_empty() {
             let geometry = json!({"type": "MultiLineString", "coordinates": place.lines(&floor.walls)?});
             features.push(feature("wall", floor.number, None, geometry));

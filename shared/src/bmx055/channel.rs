@@ -59,6 +59,17 @@ const MARGIN: usize = 4;
 /// it is read: one that still has a watermark then does not count its frames.
 const ROUNDS_MAX: usize = 8;
 
+/// What came of a burst.
+enum Burst {
+    /// Its frames were handed out.
+    Whole,
+    /// The die was reset before its end: it is none of ours.
+    Reset,
+    /// The FIFO ran over before its end: the oldest frame made room for the newest while it was read, and what was read after
+    /// that is out of step.
+    Torn,
+}
+
 /// A die and what is known of it.
 #[derive(Debug)]
 pub(super) struct Channel<SPI> {
@@ -258,7 +269,28 @@ impl<SPI: SpiDevice> Channel<SPI> {
         for setting in self.settings {
             self.set(setting, WRITE_US, delay).await?;
         }
+        // A supply that dropped in between has taken back what was written before.
+        for setting in self.settings {
+            self.verify(setting).await?;
+        }
         Ok(())
+    }
+
+    /// Whether the die was reset since it was set up: then its interrupt is off, and what it measures has another weight.
+    /// Asked after something was read, it tells of all that was read before.
+    async fn was_reset(&mut self) -> Result<bool, Error> {
+        let [.., interrupt, _] = self.settings;
+        Ok(!self.holds(interrupt).await?)
+    }
+
+    /// What a register that nobody writes reads; `None` from a die that was reset, which is set up anew then.
+    pub async fn look_up(&mut self, register: u8, now: Micros) -> Result<Option<u8>, Error> {
+        let read = port::read_one(&mut self.spi, register).await?;
+        if self.was_reset().await? {
+            self.restart(now);
+            return Ok(None);
+        }
+        Ok(Some(read))
     }
 
     /// Writes a register and, `wait_us` later, reads it back. **Units:** microseconds.
@@ -290,7 +322,7 @@ impl<SPI: SpiDevice> Channel<SPI> {
             self.count(error);
             self.fail(now);
         }
-        if now >= self.due {
+        if self.state == State::Run && now >= self.due {
             self.due = now + CHECK_US;
             if self.changed().await {
                 return self.restart(now);
@@ -301,20 +333,31 @@ impl<SPI: SpiDevice> Channel<SPI> {
         }
     }
 
-    /// Whether the next register in turn does not hold what was written, twice: the die was disturbed, and its counts
-    /// may have another weight.
+    /// Whether the next register in turn does not hold what was written: the die was disturbed, and its counts may have
+    /// another weight.
     async fn changed(&mut self) -> bool {
         let Some(&setting) = self.settings.get(self.checked) else { return false };
         self.checked = (self.checked + 1) % SETTINGS;
-        for _ in 0..2 {
-            let Err(error) = self.verify(setting).await else { return false };
-            self.count(error);
-            if matches!(error, Error::Bus(_)) {
+        self.holds(setting).await.map_or_else(
+            |error| {
+                self.count(error);
                 self.failures = self.failures.saturating_add(1);
-                return false;
+                false
+            },
+            |holds| !holds,
+        )
+    }
+
+    /// Whether a register holds what was written; not, if it is so twice.
+    async fn holds(&mut self, setting: Setting) -> Result<bool, Error> {
+        for _ in 0..2 {
+            match self.verify(setting).await {
+                Ok(()) => return Ok(true),
+                Err(error @ Error::Bus(_)) => return Err(error),
+                Err(error) => self.count(error),
             }
         }
-        true
+        Ok(false)
     }
 
     /// Empties the FIFO though no interrupt told of it.
@@ -335,22 +378,37 @@ impl<SPI: SpiDevice> Channel<SPI> {
             self.fail(now);
             return Ok(());
         }
-        self.lost |= overrun;
+        if overrun {
+            return self.start_over(now, delay).await;
+        }
         let mut left = frames;
         while left > 0 {
             let next = left.min(BATCH_FRAMES);
             left -= next;
             // The last frame may have come after `now` was read from the clock.
             let stamp = now + (self.period_us - self.span_us(left, true));
-            self.read(next, stamp, temperature, sink).await?;
+            match self.read(next, stamp, temperature, sink).await? {
+                Burst::Whole => {}
+                Burst::Reset => {
+                    self.restart(now);
+                    return Ok(());
+                }
+                Burst::Torn => return self.start_over(now, delay).await,
+            }
         }
-        if overrun {
-            self.counters.overruns = self.counters.overruns.saturating_add(1);
-            // The only way to take back the mark; frames that came in the meantime go with it.
-            self.lost = true;
-            port::write(&mut self.spi, both::FIFO_CONFIG_1, both::FIFO_STREAM).await?;
-            delay.delay_us(WRITE_US).await;
-        }
+        self.last = now + -self.period_us;
+        self.overdue = now + self.patience_us;
+        Ok(())
+    }
+
+    /// Empties a FIFO that has run over. Nothing in it is handed out: while it is full, every new frame takes the place of the
+    /// oldest, also of one that is being read.
+    async fn start_over(&mut self, now: Micros, delay: &mut impl DelayNs) -> Result<(), Error> {
+        self.counters.overruns = self.counters.overruns.saturating_add(1);
+        self.lost = true;
+        // The only way to take back the mark.
+        port::write(&mut self.spi, both::FIFO_CONFIG_1, both::FIFO_STREAM).await?;
+        delay.delay_us(WRITE_US).await;
         self.last = now + -self.period_us;
         self.overdue = now + self.patience_us;
         Ok(())
@@ -388,7 +446,17 @@ impl<SPI: SpiDevice> Channel<SPI> {
                 return Ok(());
             }
             while frames >= self.watermark {
-                self.read(self.watermark, stamp, temperature, sink).await?;
+                match self.read(self.watermark, stamp, temperature, sink).await? {
+                    Burst::Whole => {}
+                    Burst::Reset => {
+                        self.restart(now);
+                        return Ok(());
+                    }
+                    Burst::Torn => {
+                        (self.retry, self.overdue) = (true, stamp);
+                        return Ok(());
+                    }
+                }
                 frames -= self.watermark;
                 self.last = stamp;
                 self.overdue = stamp + self.patience_us;
@@ -408,21 +476,27 @@ impl<SPI: SpiDevice> Channel<SPI> {
         Ok((usize::from(status & !both::FIFO_OVERRUN), status & both::FIFO_OVERRUN != 0))
     }
 
-    /// Reads `count` frames, at most [`BATCH_FRAMES`], in one burst; the last came at `stamp`.
+    /// Reads `count` frames, at most [`BATCH_FRAMES`], in one burst; the last came at `stamp`. They are handed out if
+    /// they are whole, and of the die as it was set up.
     async fn read(
         &mut self,
         count: usize,
         stamp: Micros,
         temperature: Option<i8>,
         sink: &mut impl FnMut(&Batch),
-    ) -> Result<(), Error> {
+    ) -> Result<Burst, Error> {
         let mut bytes = [0; FRAME * BATCH_FRAMES];
         let bytes = bytes.get_mut(..FRAME * count).unwrap_or_default();
-        if let Err(error) = port::read(&mut self.spi, both::FIFO_DATA, bytes).await {
-            // Some of the frames may be gone.
-            self.lost = true;
-            return Err(error);
+        // Until all is known to be well, some of the frames may be gone.
+        let lost = core::mem::replace(&mut self.lost, true);
+        port::read(&mut self.spi, both::FIFO_DATA, bytes).await?;
+        if self.was_reset().await? {
+            return Ok(Burst::Reset);
         }
+        if self.stored().await?.1 {
+            return Ok(Burst::Torn);
+        }
+        self.lost = lost;
         let mut valid = 0;
         if self.lost {
             self.sequence = self.sequence.wrapping_add(1);
@@ -445,7 +519,7 @@ impl<SPI: SpiDevice> Channel<SPI> {
         self.counters.frames = self.counters.frames.saturating_add(valid);
         // A die that gives nothing but marks of emptiness is broken.
         self.failures = if valid > 0 { 0 } else { self.failures.saturating_add(1) };
-        Ok(())
+        Ok(Burst::Whole)
     }
 
     /// Hands frames out if there are any.

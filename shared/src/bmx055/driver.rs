@@ -81,8 +81,8 @@ impl<ACCEL: SpiDevice, GYRO: SpiDevice, MAG: SpiDevice, DELAY: DelayNs> Bmx055<A
         self.gyro.poll(now, self.temperature, &mut self.delay, &mut sink).await;
         if self.accel.state() == State::Run && now >= self.temperature_due {
             self.temperature_due = now + TEMPERATURE_US;
-            match port::read_one(self.accel.spi(), accel::TEMPERATURE).await {
-                Ok(byte) => self.temperature = Some(byte as i8),
+            match self.accel.look_up(accel::TEMPERATURE, now).await {
+                Ok(read) => self.temperature = read.map(|byte| byte as i8).or(self.temperature),
                 Err(error) => self.accel.count(error),
             }
         }
@@ -170,12 +170,15 @@ mod tests {
         ])
     }
 
-    /// Reset, identification, ten registers written and read back.
+    /// Reset, identification, ten registers written and read back, and all of them read again.
     fn cold_start(id: u8, settings: [[u8; 3]; 10]) -> Vec<Transaction<u8>> {
         let mut transactions = writes(0x14, 0xB6);
         transactions.extend(reads(0x00, &[id]));
         for [register, value, read] in settings {
             transactions.extend(writes(register, value));
+            transactions.extend(reads(register, &[read]));
+        }
+        for [register, _, read] in settings {
             transactions.extend(reads(register, &[read]));
         }
         transactions
@@ -200,8 +203,13 @@ mod tests {
             ],
         );
         accel.extend(reads(0x08, &[0xFE]));
+        // Its interrupt is on: it was not reset.
+        accel.extend(reads(0x17, &[0x40]));
         accel.extend(reads(0x0E, &[0x02]));
         accel.extend(reads(0x3F, &[0x11, 0x00, 0xEF, 0xFF, 0x0F, 0x80, 0xFF, 0x7F, 0x00, 0x00, 0x1E, 0x00]));
+        accel.extend(reads(0x17, &[0x40]));
+        // It has not run over meanwhile.
+        accel.extend(reads(0x0E, &[0x00]));
         // None is left, but the line may have stayed high.
         accel.extend(reads(0x0E, &[0x00]));
         let gyro = cold_start(

@@ -244,6 +244,32 @@ mod tests {
     }
 
     #[test]
+    fn no_frame_of_a_die_that_was_reset_is_handed_out() {
+        for die in [Die::Accel, Die::Gyro] {
+            let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, timed));
+            let mut config = Config::default();
+            // What is read after a reset is one frame, as long as the FIFO is off.
+            (config.accel.watermark, config.gyro.watermark) = (1, 1);
+            let mut rig = Rig::new(&twin, &config);
+            twin.borrow_mut().set_temperature(10);
+            for _ in 0..8 {
+                rig.run(201_300);
+                let reset = rig.now.max(twin.borrow().now());
+                twin.borrow_mut().interrupt_supply(die);
+                while rig.driver.state(die) == State::Run {
+                    rig.run(500);
+                }
+                while rig.driver.state(die) != State::Run {
+                    rig.run(500);
+                }
+                let between = |frame: &[i16; 3]| (reset.0..rig.now.0 - 500).contains(&number(frame));
+                assert_eq!(rig.frames(die).into_iter().find(between), None, "{die:?}, reset at {reset:?}");
+            }
+            assert!(rig.batches.iter().all(|batch| batch.temperature.is_none_or(|read| read == 10)));
+        }
+    }
+
+    #[test]
     fn a_bus_error_costs_a_batch_at_most_and_never_the_other_die() {
         let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, numbered()));
         let mut rig = Rig::new(&twin, &Config::default());
@@ -347,13 +373,29 @@ mod tests {
         assert_eq!((counters.overruns, counters.restarts), (1, 0));
         assert_eq!(rig.driver.counters(Die::Gyro).overruns, 0);
         let lost: Vec<_> = rig.batches.iter().filter(|batch| batch.lost).collect();
-        // What was left, and the first after the FIFO was cleared.
-        assert_eq!(lost.iter().map(|batch| batch.frames.len()).collect::<Vec<_>>(), [32, 16]);
-        assert!(number(&lost[0].frames[0]) > before + 500);
-        for batch in lost {
-            let taken = Micros(number(batch.frames.last().unwrap()));
-            // A stamp that is estimated is late by two periods at most.
-            assert!((0..=1_000).contains(&(batch.stamp - taken)), "{batch:?}");
+        // The first after the FIFO was emptied.
+        assert_eq!(lost.iter().map(|batch| batch.frames.len()).collect::<Vec<_>>(), [16]);
+        assert!(number(&lost[0].frames[0]) > before + 40_000);
+        let taken = Micros(number(lost[0].frames.last().unwrap()));
+        assert!((0..=1).contains(&(lost[0].stamp - taken)), "{lost:?}");
+    }
+
+    #[test]
+    fn a_fifo_that_runs_over_while_it_is_read_gives_no_torn_frame() {
+        // Room for 32 frames lasts for 16 ms. Torn is what comes while the first frame is read, which takes 6 us.
+        for late_us in (15_000..16_600).step_by(3) {
+            let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, timed));
+            let mut rig = Rig::new(&twin, &Config::default());
+            rig.run(100_000);
+            rig.now = rig.now + late_us;
+            rig.run(100_000);
+            let mut last = 0;
+            for frame in rig.frames(Die::Accel) {
+                let number = number(&frame);
+                assert!(number > last && number < rig.now.0, "{frame:?} after {last}, {late_us} us late");
+                last = number;
+            }
+            assert_eq!(rig.states(), [State::Run; 2]);
         }
     }
 

@@ -27,6 +27,12 @@ const ALLOWED: [&str; 16] = [
     "Zlib",
 ];
 
+/// Packages whose licence is allowed for them alone, as they name it.
+///
+/// libFuzzer is LLVM's, and was under its older licence: a notice, and no use of the authors' names. It is in the programs of
+/// `fuzz/` only, which are not passed on.
+const EXCEPTIONS: [(&str, &str); 1] = [("libfuzzer-sys", "(MIT OR Apache-2.0) AND NCSA")];
+
 #[derive(Deserialize)]
 struct Metadata {
     packages: Vec<Package>,
@@ -70,6 +76,9 @@ fn packages(manifest: &Path) -> Result<Vec<Package>, Failure> {
 fn objection(package: &Package) -> Option<String> {
     let Package { name, version, license } = package;
     let Some(text) = license else { return Some(format!("{name} {version} names no licence")) };
+    if EXCEPTIONS.contains(&(name, text)) {
+        return None;
+    }
     // Older packages write `MIT/Apache-2.0`.
     let mode = ParseMode { allow_slash_as_or_operator: true, ..ParseMode::STRICT };
     let Ok(expression) = Expression::parse_mode(text, mode) else {
@@ -93,6 +102,19 @@ mod tests {
         assert_eq!(judge(Some("MIT OR LGPL-2.1-or-later")), None);
         assert_eq!(judge(Some("(MIT OR Apache-2.0) AND OFL-1.1")), None);
         assert_eq!(judge(Some("MIT AND GPL-3.0-only")).as_deref(), Some("it 1.0.0 is under MIT AND GPL-3.0-only"));
+    }
+
+    #[test]
+    fn an_exception_is_for_one_package_and_its_licence() {
+        let (name, license) = EXCEPTIONS[0];
+        let package = |name: &str, license: &str| Package {
+            name: name.into(),
+            version: "1.0.0".into(),
+            license: Some(license.into()),
+        };
+        assert_eq!(objection(&package(name, license)), None);
+        assert!(objection(&package("another", license)).is_some());
+        assert!(objection(&package(name, "NCSA AND GPL-3.0-only")).is_some());
     }
 
     #[test]
