@@ -10,6 +10,7 @@ use sohle_shared::wire::frame::{AnyDecoder, FRAME_MAX};
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::FromShoe;
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::packed::PackedStep;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Command, Output};
@@ -274,6 +275,14 @@ fn a_live_walk_is_followed_in_a_building_served_and_the_shoe_told_its_floor_mode
     let recording = sohle::recording::open(&path, None).unwrap();
     assert!(!recording.orders.is_empty() && recording.again.unwrap().is_whole(), "{:?}", recording.again);
     assert!(recording.metadata.contains_key("began_unix_us"));
+    let again = folder.path().join("again");
+    let replay = sohle(&["replay", path.to_str().unwrap(), "--building", &twin, "--out", again.to_str().unwrap()]);
+    assert!(replay.status.success(), "{}", String::from_utf8_lossy(&replay.stderr));
+    let replayed = sohle::recording::open(&again.join("recording.mcap"), None).unwrap();
+    // The line was cut in the middle: the counts lead as far as there, where the last stance has not ended.
+    let equal = recording.steps.iter().zip(&replayed.steps);
+    let equal = equal.take_while(|(live, replayed)| PackedStep::pack(live) == PackedStep::pack(replayed)).count();
+    assert!(equal >= 5 && equal + 1 >= replayed.steps.len(), "{equal} of {}", replayed.steps.len());
 }
 
 #[test]

@@ -40,7 +40,7 @@ fn lines(walk: &Walk<'_>, path: &str, run: &[Point]) -> Vec<Feature> {
         }
         let geometry = Geometry::new_line_string(points.iter().map(|point| place(walk, point)).collect::<Vec<_>>());
         let times = points.iter().map(|point| JsonValue::from(point.time.as_seconds())).collect();
-        let stamps = points.iter().map(|point| stamp(point)).collect();
+        let stamps = points.iter().map(stamp).collect();
         lines.push(feature(
             geometry,
             properties([

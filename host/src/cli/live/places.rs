@@ -8,12 +8,17 @@ use crate::link::ground::ShoeMode;
 use crate::recording::scene::{Lines, Moment};
 use serde_json::{Value as Json, json};
 use sohle_shared::step::{FloorMode, Step};
+use sohle_shared::time::Micros;
 use sohle_shared::wire::message::Outcome;
 use std::path::Path;
 
 /// Steps that may wait for the clock of the shoe to be known. They come first when the line is good; a clock that is still not
 /// known then is not waited for.
 const WAITING: usize = 64;
+
+/// What the map knew so long ago says nothing of the ground under the next stance: a stride takes this long.
+/// **Units:** microseconds.
+const LATE_US: i64 = 1_000_000;
 
 /// Follows a live shoe.
 pub struct Places {
@@ -61,14 +66,18 @@ impl Places {
             return Vec::new();
         }
         let steps = std::mem::take(&mut self.waiting);
+        let now = connection.now();
         steps
             .iter()
-            .filter_map(|step| self.follow(step, clock.to_host(step.stance_end).map(|time| time.0), opened_us))
+            .filter_map(|step| {
+                let ended = clock.to_host(step.stance_end);
+                self.follow(step, ended.map(|ended| ended.0), ended.map(|ended| now - ended), opened_us)
+            })
             .collect()
     }
 
-    /// `host_us`: the end of the step, counted from when the program began.
-    fn follow(&mut self, step: &Step, host_us: Option<i64>, opened_us: i64) -> Option<Told> {
+    /// `host_us`: the end of the step, counted from when the program began; `age_us`: how long ago that is.
+    fn follow(&mut self, step: &Step, host_us: Option<i64>, age_us: Option<i64>, opened_us: i64) -> Option<Told> {
         // The start is where the person stood when the program began: an earlier step led there, not away from it.
         if self.starts_here && host_us.is_some_and(|host| host < 0) {
             self.before += 1;
@@ -76,7 +85,7 @@ impl Places {
         }
         let (said, object) = self.following.step(step, host_us.map(|host| opened_us + host));
         self.unusual += u64::from(said.unusual.is_some());
-        self.shoe.want(said.mode);
+        self.shoe.want(timely(said.mode, age_us));
         let moment = scene::moment(self.following.follower(), &said, object.to_string());
         Some(Told { text: words::place(&said), object, moment })
     }
@@ -129,7 +138,7 @@ impl Places {
     /// Ends it: steps whose time never became known, the tracks, the pictures. What there is to tell.
     pub fn finish(mut self, pictures: Option<&Path>, opened_us: i64) -> Result<String, Error> {
         for step in std::mem::take(&mut self.waiting) {
-            self.follow(&step, None, opened_us);
+            self.follow(&step, None, None, opened_us);
         }
         let before = match self.before {
             0 => String::new(),
@@ -143,6 +152,23 @@ impl Places {
     }
 }
 
-fn step_end(step: Option<&Step>) -> sohle_shared::time::Micros {
-    step.map_or(sohle_shared::time::Micros(0), |step| step.stance_end)
+/// The mode that follows from a step that ended `age_us` ago: a late one is worse than none, since it is held to.
+fn timely(mode: Option<FloorMode>, age_us: Option<i64>) -> Option<FloorMode> {
+    mode.filter(|_| age_us.is_some_and(|age| age < LATE_US))
+}
+
+fn step_end(step: Option<&Step>) -> Micros {
+    step.map_or(Micros(0), |step| step.stance_end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mode_that_comes_late_is_left_to_the_shoe() {
+        let level = Some(FloorMode::Level);
+        assert_eq!(timely(level, Some(20_000)), level);
+        assert_eq!((timely(level, Some(1_500_000)), timely(level, None)), (None, None));
+    }
 }
