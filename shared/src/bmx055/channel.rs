@@ -406,6 +406,8 @@ impl<SPI: SpiDevice> Channel<SPI> {
     async fn start_over(&mut self, now: Micros, delay: &mut impl DelayNs) -> Result<(), Error> {
         self.counters.overruns = self.counters.overruns.saturating_add(1);
         self.lost = true;
+        // One that always says so must be set up anew.
+        self.failures = self.failures.saturating_add(1);
         // The only way to take back the mark.
         port::write(&mut self.spi, both::FIFO_CONFIG_1, both::FIFO_STREAM).await?;
         delay.delay_us(WRITE_US).await;
