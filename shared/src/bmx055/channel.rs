@@ -162,6 +162,12 @@ impl<SPI> Channel<SPI> {
         if self.state == State::Run { self.due.min(self.overdue) } else { self.due }
     }
 
+    /// What the registers hold after `later` was written: first that, then what it left as it was.
+    pub fn settings_after<const N: usize>(&self, later: [Setting; N]) -> impl Iterator<Item = Setting> + use<N, SPI> {
+        let is_kept = move |setting: &Setting| later.iter().all(|other| other.register != setting.register);
+        later.into_iter().chain(self.settings.into_iter().filter(is_kept))
+    }
+
     /// The bus, for what has nothing to do with frames.
     pub fn spi(&mut self) -> &mut SPI {
         &mut self.spi
