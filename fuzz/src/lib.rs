@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod building;
+pub mod fifo;
 pub mod frame;
 pub mod from_shoe;
 pub mod importers;

@@ -162,6 +162,12 @@ impl<SPI> Channel<SPI> {
         if self.state == State::Run { self.due.min(self.overdue) } else { self.due }
     }
 
+    /// What the registers hold after `later` was written: first that, then what it left as it was.
+    pub fn settings_after<const N: usize>(&self, later: [Setting; N]) -> impl Iterator<Item = Setting> + use<N, SPI> {
+        let is_kept = move |setting: &Setting| later.iter().all(|other| other.register != setting.register);
+        later.into_iter().chain(self.settings.into_iter().filter(is_kept))
+    }
+
     /// The bus, for what has nothing to do with frames.
     pub fn spi(&mut self) -> &mut SPI {
         &mut self.spi
@@ -406,6 +412,8 @@ impl<SPI: SpiDevice> Channel<SPI> {
     async fn start_over(&mut self, now: Micros, delay: &mut impl DelayNs) -> Result<(), Error> {
         self.counters.overruns = self.counters.overruns.saturating_add(1);
         self.lost = true;
+        // One that always says so must be set up anew.
+        self.failures = self.failures.saturating_add(1);
         // The only way to take back the mark.
         port::write(&mut self.spi, both::FIFO_CONFIG_1, both::FIFO_STREAM).await?;
         delay.delay_us(WRITE_US).await;

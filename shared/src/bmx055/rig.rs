@@ -227,6 +227,25 @@ mod tests {
     }
 
     #[test]
+    fn a_fifo_that_always_says_it_ran_over_is_set_up_anew() {
+        for die in [Die::Accel, Die::Gyro] {
+            let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, numbered()));
+            let mut rig = Rig::new(&twin, &Config::default());
+            rig.run(500_000);
+            twin.borrow_mut().faults(die).register = Some((both::FIFO_STATUS, both::FIFO_OVERRUN | 20));
+            rig.run(1_000_000);
+            let counters = *rig.driver.counters(die);
+            // Each after ten watermarks of 8 ms and 3 or 31 ms to start up.
+            assert!((8..=12).contains(&counters.restarts), "{counters:?}");
+            twin.borrow_mut().faults(die).register = None;
+            rig.run(300_000);
+            assert_eq!(rig.states(), [State::Run; 2]);
+            assert!(rig.now - rig.batches.iter().rfind(|batch| batch.die == die).unwrap().stamp < 9_000);
+            assert_seamless(&rig, if die == Die::Accel { Die::Gyro } else { Die::Accel });
+        }
+    }
+
+    #[test]
     fn a_die_that_forgot_its_registers_is_set_up_anew() {
         for die in [Die::Accel, Die::Gyro] {
             let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, numbered()));

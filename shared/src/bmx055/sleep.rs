@@ -69,6 +69,10 @@ impl<ACCEL: SpiDevice, GYRO: SpiDevice, MAG: SpiDevice, DELAY: DelayNs> Bmx055<A
             }
         }
         self.delay.delay_ms(FIRST_MS).await;
+        // A supply that dropped in between has taken back what was written before, and nothing would tell of motion.
+        for setting in self.accel.settings_after(self.sleep.config.asleep()) {
+            self.accel.verify(setting).await.map_err(of_accel)?;
+        }
         self.sleep.rest = self.reading().await.map_err(of_accel)?;
         Ok(())
     }

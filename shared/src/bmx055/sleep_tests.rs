@@ -166,6 +166,26 @@ fn what_goes_wrong_asleep_wakes_it() {
 }
 
 #[test]
+fn a_die_that_was_reset_while_it_fell_asleep_does_not_sleep() {
+    for die in [Die::Accel, Die::Gyro] {
+        // Of the 53 ms that it takes, the supply drops in each.
+        for after_us in (0..56_000).step_by(1_000) {
+            let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, |die, time_ns| resting(die, time_ns, 0.0)));
+            let mut rig = Rig::new(&twin, &Config::default());
+            rig.run(BEDTIME_US - rig.now.0);
+            twin.borrow_mut().faults(die).supply = Some(rig.now + after_us);
+            if block_on(rig.driver.sleep(rig.now)) {
+                // Too late to be seen at once, it is seen at the next look.
+                assert!(after_us > 50_000 || die == Die::Gyro, "{die:?} after {after_us} us");
+                assert!(wakes(&mut rig, 1_200_000).is_some());
+            }
+            rig.run(300_000);
+            assert_eq!(rig.states(), [State::Run; 2], "{die:?} after {after_us} us");
+        }
+    }
+}
+
+#[test]
 fn who_wants_it_wakes_it_and_waking_the_awake_does_nothing() {
     let twin = RefCell::new(SimulatedBmx055::new(500_000, 500_000, |die, time_ns| resting(die, time_ns, 0.0)));
     let mut rig = asleep(&twin);

@@ -5,6 +5,7 @@ use super::fifo::{EMPTY, FRAME, Fifo};
 use crate::bmx055::batch::Die;
 use crate::bmx055::config::{period_of_accel, period_of_gyro};
 use crate::bmx055::registers::{accel, both, gyro};
+use crate::time::Micros;
 
 /// Addresses of seven bits.
 const REGISTERS: usize = 128;
@@ -47,6 +48,8 @@ pub struct Faults {
     pub stuck: bool,
     /// Its self-test fails.
     pub self_test: bool,
+    /// Its supply drops at this time, once.
+    pub supply: Option<Micros>,
 }
 
 /// What was done to a die that its data sheet forbids or that costs data.
@@ -274,13 +277,23 @@ impl DieTwin {
 
     /// Takes the readings that are due.
     pub fn advance(&mut self, now_ns: u64, mut counts: impl FnMut(u64) -> [i16; 3]) {
+        let drop_ns = self.faults.supply.map(|time| u64::try_from(time.0).unwrap_or_default().saturating_mul(1_000));
+        if let Some(drop_ns) = drop_ns.filter(|&drop_ns| drop_ns <= now_ns) {
+            self.faults.supply = None;
+            self.take_readings(drop_ns, &mut counts);
+            self.reset(drop_ns);
+        }
+        self.take_readings(now_ns, &mut counts);
+    }
+
+    fn take_readings(&mut self, now_ns: u64, counts: &mut impl FnMut(u64) -> [i16; 3]) {
         while self.next_ns <= now_ns {
             let time_ns = self.next_ns;
             self.next_ns += self.sample_ns();
             if self.suspended() || self.faults.stuck {
                 continue;
             }
-            let counts = if self.dozes() { self.filtered(time_ns, &mut counts) } else { counts(time_ns) };
+            let counts = if self.dozes() { self.filtered(time_ns, counts) } else { counts(time_ns) };
             let frame = self.frame(counts);
             self.observed.taken += 1;
             if self.die == Die::Accel {
@@ -293,7 +306,7 @@ impl DieTwin {
     }
 
     /// A reading that took its time: the mean of four, spread over the time that the low-pass filter needs.
-    fn filtered(&self, time_ns: u64, mut counts: impl FnMut(u64) -> [i16; 3]) -> [i16; 3] {
+    fn filtered(&self, time_ns: u64, counts: &mut impl FnMut(u64) -> [i16; 3]) -> [i16; 3] {
         let apart_ns = self.period_ns * u64::from(period_of_accel(self.get(both::BANDWIDTH))) / 500 / 4;
         let mut sums = [0_i32; 3];
         for before in (0..4).rev() {
