@@ -109,6 +109,17 @@ impl Parameters {
         Self { method: Method::Documented, least: 501, most: 2_000_000, scale_sigma: 0.0, ..Self::default() }
     }
 
+    /// The settings for steps of a phone, whose lengths are estimated and whose heading drifts.
+    pub fn phone() -> Self {
+        Self {
+            place_sigma_m: 0.05,
+            turn_sigma: 1.0_f32.to_radians(),
+            scale_sigma: 0.08,
+            scale_noise: 0.002,
+            ..Self::default()
+        }
+    }
+
     /// # Errors
     /// Names the first setting that makes no sense.
     pub fn check(&self) -> Result<(), Error> {
@@ -153,6 +164,7 @@ mod tests {
     fn both_sets_make_sense_and_nonsense_is_named() {
         Parameters::default().check().unwrap();
         Parameters::documented().check().unwrap();
+        Parameters::phone().check().unwrap();
         let nonsense = Parameters { leak: f32::NAN, ..Parameters::default() };
         assert!(nonsense.check().unwrap_err().to_string().contains("leak"));
     }

@@ -5,7 +5,8 @@
 //! (particle filter, graph, fixes) sees no difference but in the covariance.
 //!
 //! [`sample`] is what a phone measures, [`attitude`] how it is held, [`detector`] finds the steps, [`barometer`] the height;
-//! [`tracker`] puts them together. [`poslab`] and [`xyz10`] read recordings.
+//! [`tracker`] puts them together. [`poslab`] and [`xyz10`] read recordings, [`open`](mod@open) knows them
+//! apart.
 //!
 //! # Source
 //! Graph, sections 4.1 and 6.11.
@@ -13,10 +14,11 @@
 pub mod attitude;
 pub mod barometer;
 pub mod detector;
+pub mod open;
 pub mod poslab;
 pub mod sample;
 pub mod tracker;
 pub mod xyz10;
 
 pub use sample::PhoneSample;
-pub use tracker::{Parameters, PhoneTracker};
+pub use tracker::{Parameters, PhoneTracker, steps};

@@ -170,6 +170,12 @@ impl PhoneTracker {
     }
 }
 
+/// All steps of a recording.
+pub fn steps(samples: &[PhoneSample], parameters: &Parameters) -> Vec<Step> {
+    let mut tracker = PhoneTracker::new(parameters);
+    samples.iter().filter_map(|sample| tracker.push(sample)).collect()
+}
+
 fn wrapped(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
