@@ -144,7 +144,9 @@ pub fn phone(rows: &[Row]) -> Table {
     let headings = [
         "way m",
         "steps",
-        "steps alone m",
+        "documented",
+        "laid best m",
+        "default",
         "laid best m",
         "live m",
         "corrected m",
@@ -161,6 +163,8 @@ pub fn phone(rows: &[Row]) -> Table {
             vec![
                 format!("{:.1}", row.way_m),
                 row.steps.to_string(),
+                cell(row.documented_m[0], 2),
+                cell(row.documented_m[1], 2),
                 cell(row.first_leg_m, 2),
                 cell(row.fitted_m, 2),
                 cell(row.known.live_m, 2),

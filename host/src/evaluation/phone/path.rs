@@ -5,8 +5,9 @@ use crate::phone::sample::WayPoint;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
 
-/// A way-point nearer to the start than this shows no direction: it was marked to about a metre. **Units:** m.
-const FIRST_LEG_M: f64 = 4.0;
+/// A way-point nearer to the start than this shows no direction: those of the mall were marked to about a metre.
+/// **Units:** m.
+const FIRST_LEG_M: f64 = 8.0;
 
 /// Where somebody was when, in order of time. **Units:** m.
 #[derive(Clone, Debug, Default, PartialEq)]

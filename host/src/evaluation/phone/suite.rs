@@ -3,7 +3,7 @@
 use super::path::{Path, rms};
 use super::walk::{Error, PhoneWalk};
 use crate::particle::{Map, Parameters, ParticleFilter, Start, StartPlace, State};
-use crate::phone::{self, sample::WayPoint};
+use crate::phone::{self, length::Length, sample::WayPoint};
 use rayon::prelude::*;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
@@ -13,6 +13,9 @@ use std::sync::Arc;
 const START_SIGMA_M: f32 = 0.3;
 /// And in which direction, from the first leg. **Units:** rad.
 const START_HEADING_SIGMA: f32 = 0.2;
+
+/// Whoever starts from anywhere needs a thousand times the particles: not all seeds are run.
+const UNKNOWN_SEEDS: usize = 1;
 
 /// What the particle filter made of one walk.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize)]
@@ -38,6 +41,8 @@ pub struct Row {
     pub first_leg_m: Option<f64>,
     /// Steps alone, laid where they fit best. **Units:** m.
     pub fitted_m: Option<f64>,
+    /// The same two with the step length of the document. **Units:** m.
+    pub documented_m: [Option<f64>; 2],
     /// Start and heading of the first leg known; errors at all way-points.
     pub known: Found,
     /// Start unknown on the floor.
@@ -71,18 +76,27 @@ fn row(walk: &PhoneWalk, phone: &phone::Parameters, particle: &Parameters, seeds
         }]),
         _ => Start::Anywhere,
     };
-    let over_seeds = |start: &Start, from_start: bool| {
-        let found = seeds.iter().map(|&seed| follow(&walk.map, particle, start, &steps, points, (seed, from_start)));
+    let over_seeds = |start: &Start, from_start: bool, count: usize| {
+        let found = seeds
+            .iter()
+            .take(count)
+            .map(|&seed| follow(&walk.map, particle, start, &steps, points, (seed, from_start)));
         found.collect::<Result<Vec<_>, _>>().map(|found| together(&found))
     };
+    let documented =
+        Path::of(&phone::steps(&walk.samples, &phone::Parameters { length: Length::documented(), ..phone.clone() }));
     Ok(Row {
         walk: walk.name,
         way_m: crate::evaluation::alignment::path_length(&places),
         steps: steps.len(),
         first_leg_m: laid.and_then(|(path, _)| path.rmse(points)),
         fitted_m: path.fitted_rmse(points),
-        known: over_seeds(&start, true)?,
-        unknown: over_seeds(&Start::Anywhere, false)?,
+        documented_m: [
+            documented.on_first_leg(points).and_then(|(path, _)| path.rmse(points)),
+            documented.fitted_rmse(points),
+        ],
+        known: over_seeds(&start, true, usize::MAX)?,
+        unknown: over_seeds(&Start::Anywhere, false, UNKNOWN_SEEDS)?,
     })
 }
 
