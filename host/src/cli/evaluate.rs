@@ -3,6 +3,7 @@
 use super::suite as table;
 use super::{Error, parameters, print, progress};
 use crate::evaluation::building::{suite, unknown};
+use crate::evaluation::phone;
 use crate::evaluation::{Manifest, Perturbation, Report, Settings, evaluate};
 use crate::{particle, toml_file};
 use clap::ValueEnum;
@@ -17,7 +18,7 @@ pub struct Args {
     /// What to run and what is known of it; the project's own tests/recordings.toml when left out
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
-    /// Simulated walks in generated buildings in place of recordings
+    /// Walks in buildings in place of the manifest's recordings
     #[arg(long, value_enum, conflicts_with_all = ["manifest", "parameters", "only", "perturb"])]
     suite: Option<Suite>,
     /// Settings of the particle filter in place of the default
@@ -46,13 +47,15 @@ pub struct Args {
     threads: Option<std::num::NonZeroUsize>,
 }
 
-/// Walks that are made for an evaluation.
+/// Walks in buildings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Suite {
     /// The evaluation of the document (Foot, chapter 7) in a twin of its building
     FootDocument,
     /// Many walks from an unknown start on three floors, and walks of which a part is missing
     Building,
+    /// Recorded walks with a phone in the hand, on the plans of their floors
+    Phone,
 }
 
 /// How the scores are printed.
@@ -116,10 +119,13 @@ fn in_pool<T: Send>(threads: Option<std::num::NonZeroUsize>, work: impl FnOnce()
 /// Rooms of a walk from an unknown start, and of a walk of which a part is missing.
 const SHORT_STOPS: usize = 6;
 const LONG_STOPS: usize = 12;
+/// So often each walk with a phone is followed, each time with other random numbers.
+const PHONE_SEEDS: u64 = 5;
 
 fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
     let default = match &args.particle {
         Some(path) => toml_file::read("settings of the particle filter", path)?,
+        None if which == Suite::Phone => particle::Parameters::phone(),
         None => particle::Parameters::default(),
     };
     let (mut text, json) = match which {
@@ -146,6 +152,12 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
             tables.extend(rows.iter().map(table::reliability));
             let text = tables.iter().map(|table| table.text()).collect::<Vec<_>>().join("\n");
             (text, serde_json::json!({"unknown": rows, "lost": lost}))
+        }
+        Suite::Phone => {
+            let seeds: Vec<u64> = (0..PHONE_SEEDS).map(|seed| args.seed.wrapping_add(seed)).collect();
+            let steps = crate::phone::Parameters::default();
+            let rows = phone::suite::run(&phone::walk::all()?, (&steps, &default), &seeds)?;
+            (table::phone(&rows).text(), serde_json::json!({"phone": rows}))
         }
     };
     if args.format == Format::Json {

@@ -3,6 +3,7 @@
 use super::table::Table;
 use crate::evaluation::building::suite::{Errors, KnownRow, OtherRow};
 use crate::evaluation::building::unknown::{LostRow, UnknownRow};
+use crate::evaluation::phone::suite::Row;
 
 fn metres(errors: &Errors) -> String {
     format!("{:.3} / {:.3}", errors.mean_m, errors.worst_m)
@@ -135,6 +136,45 @@ pub fn lost(rows: &[LostRow]) -> Table {
                 format!("{:.1}", row.back_30_s_percent),
                 format!("{:.1}", row.back_60_s_percent),
                 format!("{:.1}", row.wrongly_percent),
+            ],
+        );
+    }
+    table
+}
+
+/// Walks with a phone.
+pub fn phone(rows: &[Row]) -> Table {
+    let headings = [
+        "way m",
+        "steps",
+        "documented",
+        "laid best m",
+        "default",
+        "laid best m",
+        "live m",
+        "corrected m",
+        "unknown: located s",
+        "live m",
+        "corrected m",
+    ];
+    let mut table = Table::new("phone, RMSE at way-points", &headings);
+    let cell =
+        |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"));
+    for row in rows {
+        table.row(
+            row.walk,
+            vec![
+                format!("{:.1}", row.way_m),
+                row.steps.to_string(),
+                cell(row.documented_m[0], 2),
+                cell(row.documented_m[1], 2),
+                cell(row.first_leg_m, 2),
+                cell(row.fitted_m, 2),
+                cell(row.known.live_m, 2),
+                cell(row.known.corrected_m, 2),
+                cell(row.unknown.located_s, 0),
+                cell(row.unknown.live_m, 2),
+                cell(row.unknown.corrected_m, 2),
             ],
         );
     }

@@ -12,6 +12,7 @@ pub mod manifest;
 pub mod matching;
 pub mod metrics;
 pub mod perturbation;
+pub mod phone;
 pub mod report;
 pub mod score;
 pub mod source;

@@ -123,6 +123,21 @@ impl Parameters {
         }
     }
 
+    /// The settings for steps of a phone in the hand. Each step says itself how far it may lead astray; what is added is what
+    /// the hand does. Its noise drives particles against the walls at every step, and those that have got through one would
+    /// outlive the others if walls cost them no more than with steps of a shoe. The scale differs little: somebody with
+    /// freedom of scale lags behind in a corridor, since what hits a wall early is what walks fast.
+    pub fn phone() -> Self {
+        Self {
+            place_sigma_m: 0.1,
+            turn_sigma: 0.0,
+            scale_sigma: 0.03,
+            scale_noise: 0.002,
+            leak: 1e-7,
+            ..Self::default()
+        }
+    }
+
     /// # Errors
     /// Names the first setting that makes no sense.
     pub fn check(&self) -> Result<(), Error> {
@@ -169,6 +184,7 @@ mod tests {
     fn both_sets_make_sense_and_nonsense_is_named() {
         Parameters::default().check().unwrap();
         Parameters::documented().check().unwrap();
+        Parameters::phone().check().unwrap();
         let nonsense = Parameters { leak: f32::NAN, ..Parameters::default() };
         assert!(nonsense.check().unwrap_err().to_string().contains("leak"));
     }

@@ -20,6 +20,15 @@ impl Default for Parameters {
     }
 }
 
+/// A step that was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// When the acceleration was largest. **Units:** s.
+    pub time: f64,
+    /// From the trough before to the peak. **Units:** m/s².
+    pub rise: f64,
+}
+
 /// Finds steps as they come: a peak is told as soon as the acceleration has fallen half-way again.
 #[derive(Clone, Debug)]
 pub struct StepDetector {
@@ -40,9 +49,8 @@ impl StepDetector {
         Self { parameters: *parameters, smooth: None, trough: f64::INFINITY, peak: None, usual: 0.0, last: None }
     }
 
-    /// Takes in the vertical acceleration at `time`, `dt` seconds after the last; tells the time of a step. **Units:** m/s²,
-    /// s.
-    pub fn push(&mut self, vertical: f64, time: f64, dt: f64) -> Option<f64> {
+    /// Takes in the vertical acceleration at `time`, `dt` seconds after the last; tells of a step. **Units:** m/s², s.
+    pub fn push(&mut self, vertical: f64, time: f64, dt: f64) -> Option<Found> {
         let part = 1.0 - (-std::f64::consts::TAU * self.parameters.cut_off_hz * dt).exp();
         let [first, second] = self.smooth.unwrap_or([vertical; 2]);
         let first = first + part * (vertical - first);
@@ -51,7 +59,7 @@ impl StepDetector {
         self.look(value, time)
     }
 
-    fn look(&mut self, value: f64, time: f64) -> Option<f64> {
+    fn look(&mut self, value: f64, time: f64) -> Option<Found> {
         let p = self.parameters;
         match self.peak {
             Some((highest, _)) if value < highest => {}
@@ -76,7 +84,7 @@ impl StepDetector {
         }
         self.last = Some(at);
         self.usual = if self.usual == 0.0 { rise } else { self.usual + 0.15 * (rise - self.usual) };
-        Some(at)
+        Some(Found { time: at, rise })
     }
 }
 
@@ -89,6 +97,7 @@ mod tests {
         let mut detector = StepDetector::new(&Parameters::default());
         (0..(seconds * 100.0) as i32)
             .filter_map(|i| detector.push(acceleration(f64::from(i) / 100.0), f64::from(i) / 100.0, 0.01))
+            .map(|found| found.time)
             .collect()
     }
 

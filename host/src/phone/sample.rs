@@ -59,6 +59,12 @@ pub enum ReadError {
         /// What is wrong.
         what: String,
     },
+    /// Of no kind that can be read.
+    #[error("{file} is no recording of a phone")]
+    Unknown {
+        /// Its name.
+        file: String,
+    },
     /// Nothing to track.
     #[error("{file} has no samples of {what}")]
     Empty {

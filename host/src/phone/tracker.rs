@@ -3,6 +3,7 @@
 use super::attitude::{self, Attitude};
 use super::barometer::{self, Barometer};
 use super::detector::{self, StepDetector};
+use super::length::Length;
 use super::sample::PhoneSample;
 use nalgebra::{Matrix4, Vector3};
 use sohle_shared::sample::ClippedSamples;
@@ -31,14 +32,16 @@ pub struct Parameters {
     pub barometer: barometer::Parameters,
     /// Height of the person. **Units:** m.
     pub person_m: f64,
-    /// Model of the step length (Graph, 4.2): `a`, `b`, `c`.
-    pub length: [f64; 3],
+    /// How long steps are.
+    pub length: Length,
     /// How wrong a length is from step to step (standard deviation, as a part of it).
     pub length_part: f64,
     /// How far a step leads aside (standard deviation). **Units:** m.
     pub aside_m: f64,
     /// How wrong a turn is (standard deviation). **Units:** rad.
     pub turn_sigma: f64,
+    /// And how wrong as a part of it: who turns does not hold the phone as still as who goes straight on.
+    pub turn_part: f64,
 }
 
 impl Default for Parameters {
@@ -48,11 +51,19 @@ impl Default for Parameters {
             detector: detector::Parameters::default(),
             barometer: barometer::Parameters::default(),
             person_m: 1.75,
-            length: [0.371, 0.227, 1.0],
+            length: Length::default(),
             length_part: 0.07,
             aside_m: 0.05,
-            turn_sigma: 2.0_f64.to_radians(),
+            turn_sigma: 1.0_f64.to_radians(),
+            turn_part: 0.05,
         }
+    }
+}
+
+impl Parameters {
+    /// With the step length of the document.
+    pub fn documented() -> Self {
+        Self { length: Length::documented(), ..Self::default() }
     }
 }
 
@@ -112,12 +123,12 @@ impl PhoneTracker {
         self.headings.1 += 1;
         let vertical = sample.accel.dot(&self.attitude.up()) - GRAVITY;
         let seconds = sample.time.0 as f64 * 1e-6;
-        self.detector.push(vertical, seconds, dt)?;
-        Some(self.step(sample.time))
+        let found = self.detector.push(vertical, seconds, dt)?;
+        Some(self.step(sample.time, found.rise))
     }
 
     /// The step that ends now. Its direction is the mean heading since the last one: so the sway of the body falls out.
-    fn step(&mut self, time: Micros) -> Step {
+    fn step(&mut self, time: Micros, bounce: f64) -> Step {
         let p = &self.parameters;
         let (sum, number) = std::mem::take(&mut self.headings);
         let heading = sum / f64::from(number.max(1));
@@ -129,11 +140,16 @@ impl PhoneTracker {
             None => (time, 0.0, None),
         };
         let seconds = (time - before) as f64 * 1e-6;
-        let length = if seconds > 0.0 { self.length(1.0 / seconds) } else { 0.0 };
-        let along = (p.length_part * length).powi(2) + LEAST_SIGMA_M * LEAST_SIGMA_M;
+        let (length, part) = if seconds > 0.0 {
+            (p.length.of(p.person_m, 1.0 / seconds, bounce), p.length_part)
+        } else {
+            // Of the first step of all nobody knows where in it the recording began.
+            (0.5 * p.length.of(p.person_m, f64::INFINITY, bounce), 0.5)
+        };
+        let along = (part * length).powi(2) + LEAST_SIGMA_M * LEAST_SIGMA_M;
         let aside = p.aside_m * p.aside_m;
         let tall = rise.map_or(UNKNOWN_HEIGHT_M, |_| p.barometer.sigma_m).powi(2);
-        let turned = p.turn_sigma * p.turn_sigma;
+        let turned = p.turn_sigma * p.turn_sigma + (p.turn_part * turn).powi(2);
         // Along and aside of the new direction, seen from the old one.
         let (sin, cos) = turn.sin_cos();
         let (xx, yy) = (along * cos * cos + aside * sin * sin, along * sin * sin + aside * cos * cos);
@@ -159,15 +175,12 @@ impl PhoneTracker {
         self.count = self.count.wrapping_add(1);
         step
     }
+}
 
-    /// (Graph, 4.2), for frequencies that a step may have. **Units:** m from Hz.
-    fn length(&self, frequency: f64) -> f64 {
-        let [a, b, c] = self.parameters.length;
-        let tall = self.parameters.person_m;
-        let length = (0.7 + a * (tall - 1.75) + b * (frequency.clamp(1.2, 3.0) - 1.79) * tall / 1.75) * c;
-        // Who stands in between does not take a longer step, and nobody steps backwards.
-        length.clamp(0.2, 1.5)
-    }
+/// All steps of a recording.
+pub fn steps(samples: &[PhoneSample], parameters: &Parameters) -> Vec<Step> {
+    let mut tracker = PhoneTracker::new(parameters);
+    samples.iter().filter_map(|sample| tracker.push(sample)).collect()
 }
 
 fn wrapped(angle: f64) -> f64 {
@@ -208,7 +221,7 @@ mod tests {
             place = [place[0] + cos * x - sin * y, place[1] + sin * x + cos * y];
             heading += f64::from(step.turn);
         }
-        // 1.8 Hz are 0.702 m; the corner is cut by a step at most.
+        // The low-pass leaves a bounce of 3.6 m/s², which stands for 0.655 m; the corner is cut by a step at most.
         assert!((heading - PI / 2.0).abs() < 0.12, "{heading}");
         assert!((place[0] - 13.2).abs() < 1.5 && (place[1] - 12.6).abs() < 1.5, "{place:?}");
         assert!(
