@@ -46,13 +46,14 @@ pub struct InBuilding {
 }
 
 impl InBuilding {
-    /// Reads the building and the start, if a building is asked for.
-    pub fn prepare(&self) -> Result<Option<Follower>, Error> {
+    /// Reads the building and the start, if a building is asked for; the filter has the settings `default` unless a file
+    /// says otherwise.
+    pub fn prepare(&self, default: Parameters) -> Result<Option<Follower>, Error> {
         let Some(path) = &self.building else { return Ok(None) };
         let building = open(path, &Options::default())?;
         let parameters = match &self.particle {
             Some(path) => toml_file::read("settings of the particle filter", path)?,
-            None => Parameters::default(),
+            None => default,
         };
         let start = start(&building, &self.start)?;
         let map = Arc::new(Map::of(&building)?);

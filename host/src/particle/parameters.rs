@@ -120,6 +120,8 @@ impl Parameters {
             scale_sigma: 0.03,
             scale_noise: 0.002,
             leak: 1e-7,
+            // Along a corridor nothing says better where somebody is.
+            located_sigma_m: 2.0,
             ..Self::default()
         }
     }
