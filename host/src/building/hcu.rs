@@ -2,13 +2,14 @@
 //! polygons with IFC classes.
 //!
 //! Walls and facades are solid: their borders are walls. Doors lie in walls as polygons of their own; what of a wall lies
-//! lies
-//! along a door is taken out. Spaces are rooms; staircases and elevators join floors where they lie above each other.
+//! along a door is taken out. Spaces are rooms; where one ends with nothing beyond, the floor ends and there is a wall, too.
+//! Staircases and elevators join floors where they lie above each other.
 
+use super::edge::open_edges;
 use super::error::Error;
 use super::features::{self, RawFeature};
 use super::geojson::project;
-use super::geometry::{self, Point, Segment};
+use super::geometry::{self, Outline, Point, Segment};
 use super::georeference::Georeference;
 use super::model::{Building, ConnectorKind, Door, Floor, Room};
 use super::opening::{self, Opening};
@@ -62,6 +63,7 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
     let mut floor =
         Floor { number: file.number, name: file.name.to_owned(), height_m: file.height_m, ..Floor::default() };
     let mut doors: Vec<Opening> = Vec::new();
+    let mut solids: Vec<Vec<Outline>> = Vec::new();
     for feature in features {
         let class = feature.text("ifc_class").ok_or_else(|| feature.error(file.file, "it has no 'ifc_class'"))?;
         let outlines =
@@ -69,11 +71,13 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
         match &class.to_lowercase()[..] {
             "ifcwall" | "ifcfacade" => {
                 floor.walls.extend(feature.polygons.iter().flatten().flat_map(|ring| geometry::sides(ring)));
+                solids.extend(feature.polygons.iter().cloned());
             }
             "ifcdoor" => {
                 for outline in outlines {
                     if let Some(line) = geometry::middle_line(outline) {
                         floor.doors.push(Door { line, name: feature.text("spaceID").filter(|name| name != "Door") });
+                        solids.push(vec![outline.clone()]);
                         doors.push(Opening { line, depth_m: thickness(outline, &line) / 2.0 + DOOR_REACH_M });
                     }
                 }
@@ -90,6 +94,8 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
         }
     }
     floor.walls = opening::cut(&floor.walls, &doors);
+    let rooms: Vec<Outline> = floor.rooms.iter().map(|room| room.outline.clone()).collect();
+    floor.walls.extend(open_edges(&rooms, solids));
     Ok(floor)
 }
 
@@ -147,7 +153,9 @@ mod tests {
         let floor = &building.floors[0];
         let total: f64 = floor.walls.iter().map(geometry::length).sum();
         // Both long sides lose the door; the degrees above are metres to a percent.
-        assert!((total - (2.0 * 8.9 + 2.0 * 0.2 - 2.0 * 0.9)).abs() < 0.1, "{total}");
+        let wall = 2.0 * 8.9 + 2.0 * 0.2 - 2.0 * 0.9;
+        // Beyond the other three sides of the room there is nothing: there the floor ends.
+        assert!((total - (wall + 8.9 + 2.0 * 4.8)).abs() < 0.1, "{total}");
         assert!((geometry::length(&floor.doors[0].line) - 0.9).abs() < 0.01);
         assert_eq!((floor.rooms[0].name.as_str(), floor.rooms[0].usage.as_deref()), ("4 001", Some("Office")));
         assert!(matches!(building.georeference, Georeference::Utm { epsg: 32_632, .. }));

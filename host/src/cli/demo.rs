@@ -6,6 +6,7 @@ use super::{Error, Output, progress, report};
 use crate::building::open::{Options, open};
 use crate::building::{Building, geojson, route};
 use crate::export::file;
+use crate::particle::Parameters;
 use crate::recording;
 use crate::simulation::{Route, Scenario, output};
 use std::path::PathBuf;
@@ -65,7 +66,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         };
         let route = Route::through(&building, &route::plan(&building, &stops)?)?;
         let title = format!("A simulated walk in {}, seed {seed}", building.name);
-        let following = args.how.follow(building)?.keeping_all();
+        let following = args.how.follow(building, Parameters::default())?.keeping_all();
         (Scenario { route, ..Scenario::default() }, title, Some(following))
     };
     let scenario = Scenario { seed, ..scenario };
@@ -89,7 +90,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         quiet,
     };
     let recording = report.run()?;
-    following.map_or(Ok(()), |following: Following| finish_and_tell(following, &recording, &folder, quiet))
+    following.map_or(Ok(()), |following: Following| finish_and_tell(following, Some(&recording), &folder, quiet))
 }
 
 /// The building to walk in.

@@ -18,6 +18,7 @@ pub mod line;
 pub mod live;
 mod located;
 pub mod parameters;
+mod phone;
 pub mod replay;
 pub mod report;
 pub mod simulate;

@@ -1,10 +1,12 @@
 //! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
 
 use super::located::{Following, InBuilding, finish_and_tell};
+use super::phone::Replay;
 use super::report::{Report, Settings};
 use super::{Error, Output, convert, parameters, print};
 use crate::calibration;
 use crate::recording::{self, Profile};
+use crate::{particle, phone};
 use std::path::PathBuf;
 
 /// Tracks a recorded walk
@@ -17,12 +19,12 @@ sohle replay walk.mcap --parameters mine.toml --origin 48.2087,16.3726,35\n  \
 sohle replay walk.mcap --building buildings/twin.geojson --start entrances"
 )]
 pub struct Args {
-    /// The recording: MCAP of this program, or any layout that --profile can name
+    /// The recording: MCAP of this program, any layout that --profile can name, or a walk with a phone
     file: PathBuf,
     /// How the file is laid out; recognised from the content when left out
     #[arg(long, value_name = "NAME|FILE.toml", long_help = convert::long_help())]
     profile: Option<String>,
-    /// Settings of the tracker as 'sohle parameters' prints them; others keep their default
+    /// Settings of the tracker as 'sohle parameters' prints them, or of a phone's steps; others keep their default
     #[arg(long, value_name = "FILE.toml")]
     parameters: Option<PathBuf>,
     /// What 'sohle calibrate' found of the sensor; every sample is corrected by it before it is tracked
@@ -40,8 +42,20 @@ pub struct Args {
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
     let Args { file, profile, parameters, calibration, compare, place, output } = args;
-    let mut following = place.prepare()?.map(Following::keeping_all);
     let quiet = output.quiet || place.how.wanted.takes_stdout();
+    if phone::open::is_phone(&file) {
+        let useless = [("--profile", profile.is_some()), ("--calibration", calibration.is_some())];
+        if let Some((option, _)) = useless.into_iter().find(|(_, given)| *given) {
+            return Err(Error::new(format!(
+                "{option} is for recordings of a shoe; {} is one of a phone",
+                file.display()
+            )));
+        }
+        let following = place.prepare(particle::Parameters::phone())?.map(Following::keeping_all);
+        let parameters = parameters.as_deref();
+        return Replay { file: &file, parameters, compare, following, output: &output, quiet }.run();
+    }
+    let mut following = place.prepare(particle::Parameters::default())?.map(Following::keeping_all);
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut settings = vec![match &parameters {
         Some(path) => Settings { label: stem(path), parameters: parameters::read(path)?, ..Settings::default() },
@@ -72,7 +86,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     }
     .run()?;
     if let Some(following) = following {
-        finish_and_tell(following, &recording, &folder, quiet)?;
+        finish_and_tell(following, Some(&recording), &folder, quiet)?;
     }
     match again {
         Some(again) if !again.is_whole() => Err(Error::new(format!("computed again, the steps differ: {again}"))),

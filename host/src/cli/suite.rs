@@ -172,9 +172,9 @@ pub fn phone(rows: &[Row]) -> Table {
                 cell(row.fitted_m, 2),
                 cell(row.known.live_m, 2),
                 cell(row.known.corrected_m, 2),
-                cell(row.unknown.located_s, 0),
-                cell(row.unknown.live_m, 2),
-                cell(row.unknown.corrected_m, 2),
+                cell(row.unknown.and_then(|found| found.located_s), 0),
+                cell(row.unknown.and_then(|found| found.live_m), 2),
+                cell(row.unknown.and_then(|found| found.corrected_m), 2),
             ],
         );
     }

@@ -205,6 +205,9 @@ impl Covariance {
                 if floor.grid.cell(to).is_none() {
                     continue;
                 }
+            } else if !floor.inside.at(to) {
+                // Nor is anybody outside: in the open nothing is in the way, and what got there would outlive the others.
+                particle.weight *= self.leak;
             }
             [particle.x, particle.y] = to;
             let was_in = particle.is_in_connector();
@@ -292,6 +295,16 @@ mod tests {
             advance(&mut particles, &small(), &ahead(1.0, 0.0), &parameters, 1, 1);
             assert_eq!(particles.map(|particle| particle.weight), [weight, 1.0]);
         }
+    }
+
+    #[test]
+    fn outside_every_step_costs_as_much_as_a_wall() {
+        let mut particles = [at(19.0, 2.0, 0.0), at(13.0, 2.0, 0.0)];
+        for number in 0..2 {
+            advance(&mut particles, &small(), &ahead(1.5, 0.0), &exact(), 1, number);
+        }
+        let [outside, inside] = particles.map(|particle| particle.weight);
+        assert!((outside - 1e-6).abs() < 1e-9 && inside == 1.0, "{outside} {inside}");
     }
 
     #[test]

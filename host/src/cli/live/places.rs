@@ -5,6 +5,7 @@ use crate::cli::{Error, live::words};
 use crate::follow::{mode_word, scene};
 use crate::link::Connection;
 use crate::link::ground::ShoeMode;
+use crate::particle::Parameters;
 use crate::recording::scene::{Lines, Moment};
 use serde_json::{Value as Json, json};
 use sohle_shared::step::{FloorMode, Step};
@@ -41,7 +42,7 @@ pub struct Told {
 impl Places {
     /// Reads the building and the start, if a building is asked for.
     pub fn prepare(place: &InBuilding) -> Result<Option<Self>, Error> {
-        let following = place.prepare()?;
+        let following = place.prepare(Parameters::default())?;
         Ok(following.map(|following| Self {
             following,
             shoe: ShoeMode::default(),

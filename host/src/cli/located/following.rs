@@ -124,7 +124,12 @@ impl Following {
 }
 
 /// The same, told on the standard output unless `quiet`.
-pub fn finish_and_tell(following: Following, recording: &Recording, folder: &Path, quiet: bool) -> Result<(), Error> {
-    let told = following.finish(Some(recording), Some(folder))?;
+pub fn finish_and_tell(
+    following: Following,
+    recording: Option<&Recording>,
+    folder: &Path,
+    quiet: bool,
+) -> Result<(), Error> {
+    let told = following.finish(recording, Some(folder))?;
     if quiet { Ok(()) } else { print(&format!("\n{told}")) }
 }

@@ -12,6 +12,7 @@ use super::Error;
 use crate::building::Building;
 use crate::building::open::{Options, open};
 use crate::follow::{Follower, Settings, Steering};
+use crate::particle::Parameters;
 use crate::toml_file;
 use std::path::PathBuf;
 
@@ -47,10 +48,11 @@ pub struct How {
 }
 
 impl InBuilding {
-    /// Reads the building and the start, if a building is asked for.
-    pub fn prepare(&self) -> Result<Option<Following>, Error> {
+    /// Reads the building and the start, if a building is asked for; the filter has the settings `default` unless a file says
+    /// otherwise.
+    pub fn prepare(&self, default: Parameters) -> Result<Option<Following>, Error> {
         match (&self.building, self.how.given()) {
-            (Some(path), _) => self.how.follow(open(path, &Options::default())?).map(Some),
+            (Some(path), _) => self.how.follow(open(path, &Options::default())?, default).map(Some),
             (None, Some(option)) => Err(Error::new(format!("{option} needs a building: --building FILE"))),
             (None, None) => Ok(None),
         }
@@ -77,14 +79,14 @@ impl How {
         given.iter().find(|(_, given)| *given).map(|(option, _)| *option)
     }
 
-    /// Begins to follow in a building.
-    pub fn follow(&self, building: Building) -> Result<Following, Error> {
+    /// Begins to follow in a building, by the settings `default` unless a file says otherwise.
+    pub fn follow(&self, building: Building, default: Parameters) -> Result<Following, Error> {
         let usual = Settings::default();
         let settings = Settings {
             start: self.start.clone().unwrap_or(usual.start),
             particle: match &self.particle {
                 Some(path) => toml_file::read("settings of the particle filter", path)?,
-                None => usual.particle,
+                None => default,
             },
             seed: self.particle_seed.unwrap_or(usual.seed),
             steering: self.floor_mode.unwrap_or(usual.steering),

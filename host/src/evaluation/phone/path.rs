@@ -100,9 +100,9 @@ mod tests {
 
     #[test]
     fn the_first_leg_gives_start_and_heading_and_nothing_else() {
-        let path = Path(vec![(Micros(0), [0.0, 0.0]), (Micros(10), [5.0, 0.0]), (Micros(20), [5.0, 6.0])]);
+        let path = Path(vec![(Micros(0), [0.0, 0.0]), (Micros(10), [9.0, 0.0]), (Micros(20), [9.0, 6.0])]);
         // Northwards from (7, 7), the first leg a metre longer than the path knows; then to the left.
-        let truth = points(&[(0, [7.0, 7.0]), (1, [8.0, 7.0]), (10, [7.0, 13.0]), (20, [1.0, 13.0])]);
+        let truth = points(&[(0, [7.0, 7.0]), (1, [8.0, 7.0]), (10, [7.0, 17.0]), (20, [1.0, 17.0])]);
         let (laid, heading) = path.on_first_leg(&truth).unwrap();
         assert!((heading - PI / 2.0).abs() < 1e-12);
         let errors = laid.errors(&truth);

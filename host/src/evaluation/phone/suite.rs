@@ -14,8 +14,8 @@ const START_SIGMA_M: f32 = 0.3;
 /// And in which direction, from the first leg. **Units:** rad.
 const START_HEADING_SIGMA: f32 = 0.2;
 
-/// Whoever starts from anywhere needs a thousand times the particles: not all seeds are run.
-const UNKNOWN_SEEDS: usize = 1;
+/// Whoever starts from anywhere needs a hundred times the particles: not all seeds are run.
+const UNKNOWN_SEEDS: usize = 3;
 
 /// What the particle filter made of one walk.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize)]
@@ -45,8 +45,8 @@ pub struct Row {
     pub documented_m: [Option<f64>; 2],
     /// Start and heading of the first leg known; errors at all way-points.
     pub known: Found,
-    /// Start unknown on the floor.
-    pub unknown: Found,
+    /// Start unknown on the floor, if it is searched.
+    pub unknown: Option<Found>,
 }
 
 /// Follows all walks. Each seed of the filter runs; errors are the root mean square over the seeds.
@@ -96,7 +96,7 @@ fn row(walk: &PhoneWalk, phone: &phone::Parameters, particle: &Parameters, seeds
             documented.fitted_rmse(points),
         ],
         known: over_seeds(&start, true, usize::MAX)?,
-        unknown: over_seeds(&Start::Anywhere, false, UNKNOWN_SEEDS)?,
+        unknown: walk.search.then(|| over_seeds(&Start::Anywhere, false, UNKNOWN_SEEDS)).transpose()?,
     })
 }
 

@@ -3,8 +3,8 @@
 use crate::building::open::{Options, open};
 use crate::building::{self, Building, Georeference};
 use crate::particle::{self, Map};
+use crate::phone;
 use crate::phone::sample::{PhoneSample, ReadError, WayPoint};
-use crate::phone::{self};
 use crate::recording::recordings_dir;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,6 +39,7 @@ struct Source {
     recording: &'static str,
     plan: &'static str,
     floor: i32,
+    search: bool,
 }
 
 const SOURCES: [Source; 6] = [
@@ -47,6 +48,7 @@ const SOURCES: [Source; 6] = [
         recording: "hcu_hamburg/eight_walk",
         plan: "hcu_hamburg/floorplans/4OG.geojson",
         floor: 4,
+        search: true,
     },
     mall("mall F1 a", "xyz10_mall/site1/F1/5dd9ef979191710006b57086.txt", "xyz10_mall/site1/F1", 1),
     mall("mall F1 b", "xyz10_mall/site1/F1/5dd9fd549191710006b570e6.txt", "xyz10_mall/site1/F1", 1),
@@ -56,7 +58,7 @@ const SOURCES: [Source; 6] = [
 ];
 
 const fn mall(name: &'static str, recording: &'static str, plan: &'static str, floor: i32) -> Source {
-    Source { name, recording, plan, floor }
+    Source { name, recording, plan, floor, search: false }
 }
 
 /// A walk, its way-points and the plan of its floor.
@@ -74,6 +76,9 @@ pub struct PhoneWalk {
     pub map: Arc<Map>,
     /// Number of the floor.
     pub floor: i32,
+    /// Whether to look for the walk from anywhere on the floor. Those of the mall have 40 000 m², and way-points only in
+    /// corridors that look alike.
+    pub search: bool,
 }
 
 impl PhoneWalk {
@@ -100,6 +105,7 @@ impl PhoneWalk {
             map: Arc::new(Map::of(&building)?),
             building,
             floor: source.floor,
+            search: source.search,
         })
     }
 }
