@@ -8,6 +8,7 @@
 //! x east, y north, z up from the origin of the building, in metres. [`Georeference`] tells where that is.
 
 pub mod check;
+pub mod dxf;
 mod edge;
 pub mod error;
 mod features;

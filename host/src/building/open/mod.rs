@@ -2,6 +2,7 @@
 
 mod recognise;
 
+use super::dxf::{self, Layers, PlanFile};
 use super::error::Error;
 use super::hcu::FloorFile;
 use super::model::Building;
@@ -21,6 +22,8 @@ pub enum Format {
     Xyz10,
     /// OpenStreetMap XML with Simple Indoor Tagging
     Osm,
+    /// DXF by layer: a file for each floor, a folder of them, or one file with the floor in the names of the layers
+    Dxf,
 }
 
 /// What files may leave open.
@@ -30,12 +33,14 @@ pub struct Options {
     pub format: Option<Format>,
     /// From floor to floor, where the format has no heights. **Units:** m.
     pub storey_m: f64,
+    /// What is on which layer of a DXF file.
+    pub layers: Layers,
 }
 
 impl Default for Options {
     fn default() -> Self {
         // Offices and schools have 3 to 4 m.
-        Self { format: None, storey_m: 3.5 }
+        Self { format: None, storey_m: 3.5, layers: Layers::default() }
     }
 }
 
@@ -56,7 +61,16 @@ pub fn open(path: &Path, options: &Options) -> Result<Building, Error> {
         Format::Hcu => open_hcu(path, options),
         Format::Xyz10 => open_xyz10(path),
         Format::Osm => osm::parse(&stem(path), &text(path)?, &shown(path), options.storey_m),
+        Format::Dxf => open_dxf(path, options),
     }
+}
+
+/// The names of layers in a TOML file.
+///
+/// # Errors
+/// When it cannot be read or is no table of layers.
+pub fn layers(path: &Path) -> Result<Layers, Error> {
+    Layers::parse(&text(path)?, &shown(path))
 }
 
 fn unknown(path: &Path, what: &str) -> Error {
@@ -139,6 +153,24 @@ fn open_hcu(path: &Path, options: &Options) -> Result<Building, Error> {
         })
         .collect();
     hcu::parse(&stem(path), &files)
+}
+
+fn open_dxf(path: &Path, options: &Options) -> Result<Building, Error> {
+    let paths = if path.is_dir() { files(path, "dxf")? } else { vec![path.to_owned()] };
+    let mut plans = Vec::new();
+    for path in &paths {
+        let name = stem(path);
+        let (number, name) = match floor_number(&name) {
+            Some(number) => (number, name),
+            // One file may be called like the building: its floors are in the names of its layers, or it has one.
+            None if paths.len() == 1 => (0, "0".to_owned()),
+            None => return Err(unknown(path, "the name of the file must be that of the floor, as EG, 1OG or 2UG")),
+        };
+        plans.push((number, name, shown(path), bytes(path)?));
+    }
+    let plans: Vec<_> =
+        plans.iter().map(|(number, name, file, bytes)| PlanFile { number: *number, name, bytes, file }).collect();
+    dxf::parse(&stem(path), &plans, &options.layers, options.storey_m)
 }
 
 const XYZ10_MAP: &str = "geojson_map.json";

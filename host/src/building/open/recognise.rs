@@ -1,6 +1,7 @@
 //! Tells the format of a building by what is in the file or folder.
 
 use super::{Format, XYZ10_INFO, XYZ10_MAP, bytes, files, text, unknown};
+use crate::building::dxf;
 use crate::building::error::Error;
 use std::path::Path;
 
@@ -17,16 +18,24 @@ fn of_folder(path: &Path) -> Result<Format, Error> {
     if has(XYZ10_MAP) && has(XYZ10_INFO) {
         return Ok(Format::Xyz10);
     }
-    match files(path, "geojson")?.first() {
-        Some(first) if text(first)?.contains("\"ifc_class\"") => Ok(Format::Hcu),
-        _ => Err(unknown(path, "the folder holds neither floors with IFC classes nor a floor_info.json")),
+    if let Some(first) = files(path, "geojson")?.first()
+        && text(first)?.contains("\"ifc_class\"")
+    {
+        return Ok(Format::Hcu);
     }
+    if !files(path, "dxf")?.is_empty() {
+        return Ok(Format::Dxf);
+    }
+    Err(unknown(path, "the folder holds neither floors with IFC classes or in DXF nor a floor_info.json"))
 }
 
 fn of_file(path: &Path) -> Result<Format, Error> {
     let bytes = bytes(path)?;
     if bytes.starts_with(b"PK\x03\x04") {
         return Err(unknown(path, "it is an archive: unpack it and name the folder"));
+    }
+    if dxf::is_dxf(&bytes) {
+        return Ok(Format::Dxf);
     }
     let text = String::from_utf8(bytes).map_err(|_| unknown(path, "it is no text (UTF-8)"))?;
     if text.contains("\"sohle_building\"") {

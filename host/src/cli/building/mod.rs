@@ -4,7 +4,8 @@ mod check;
 
 use super::table::Table;
 use super::{Error, print};
-use crate::building::open::{Format, Options, open};
+use crate::building::dxf::Layers;
+use crate::building::open::{self, Format, Options};
 use crate::building::{Building, ConnectorKind, generate, geojson, geometry, picture};
 use crate::export::{file, png};
 use std::path::{Path, PathBuf};
@@ -69,6 +70,9 @@ struct Input {
     /// From floor to floor in metres, where the format has no heights
     #[arg(long, value_name = "M", default_value_t = Options::default().storey_m)]
     storey: f64,
+    /// What is on which layer of a DXF file (docs/building.md); the layers of the graph document when left out
+    #[arg(long, value_name = "FILE.toml")]
+    layers: Option<PathBuf>,
 }
 
 impl Input {
@@ -76,15 +80,20 @@ impl Input {
         if !(1.0..=100.0).contains(&self.storey) {
             return Err(Error::new(format!("--storey {}: expected 1 to 100 metres", self.storey)));
         }
-        let options = Options { format: self.format, storey_m: self.storey };
-        Ok(open(&self.input, &options)?)
+        let layers = match &self.layers {
+            Some(path) => open::layers(path)?,
+            None => Layers::default(),
+        };
+        let options = Options { format: self.format, storey_m: self.storey, layers };
+        Ok(open::open(&self.input, &options)?)
     }
 }
 
 /// Converts a building to the project's own GeoJSON
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  sohle building convert floorplans/ house.geojson --storey 4.2\n  \
-                        sohle building convert site1/F4 mall.geojson")]
+                        sohle building convert site1/F4 mall.geojson\n  \
+                        sohle building convert plans/ house.geojson --layers layers.toml")]
 struct ConvertArgs {
     #[command(flatten)]
     input: Input,
