@@ -2,6 +2,7 @@
 
 use super::error::Error;
 use super::geometry::{Outline, Point};
+use ::geojson::feature::Id;
 use ::geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
 
 /// A feature: its properties and what it is made of.
@@ -9,6 +10,8 @@ use ::geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject,
 pub(super) struct RawFeature {
     /// Counted from 1.
     pub index: usize,
+    /// Its identifier, if it has one.
+    pub id: Option<String>,
     pub properties: JsonObject,
     pub points: Vec<Point>,
     pub lines: Vec<Vec<Point>>,
@@ -61,6 +64,10 @@ pub(super) fn features(collection: FeatureCollection, name: &str) -> Result<Vec<
     for (index, feature) in collection.features.into_iter().enumerate() {
         let mut raw = RawFeature {
             index: index + 1,
+            id: feature.id.map(|id| match id {
+                Id::String(text) => text,
+                Id::Number(number) => number.to_string(),
+            }),
             properties: feature.properties.unwrap_or_default(),
             ..RawFeature::default()
         };

@@ -17,6 +17,7 @@ pub mod geojson;
 pub mod geometry;
 pub mod georeference;
 pub mod hcu;
+pub mod imdf;
 mod index;
 pub mod merge;
 mod model;

@@ -6,7 +6,7 @@ use super::dxf::{self, Layers, PlanFile};
 use super::error::Error;
 use super::hcu::FloorFile;
 use super::model::Building;
-use super::{geojson, hcu, osm, xyz10};
+use super::{geojson, hcu, imdf, osm, xyz10};
 use recognise::recognise;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,6 +24,8 @@ pub enum Format {
     Osm,
     /// DXF by layer: a file for each floor, a folder of them, or one file with the floor in the names of the layers
     Dxf,
+    /// Indoor Mapping Data Format: the folder of an unpacked archive, or a file in it
+    Imdf,
 }
 
 /// What files may leave open.
@@ -62,6 +64,7 @@ pub fn open(path: &Path, options: &Options) -> Result<Building, Error> {
         Format::Xyz10 => open_xyz10(path),
         Format::Osm => osm::parse(&stem(path), &text(path)?, &shown(path), options.storey_m),
         Format::Dxf => open_dxf(path, options),
+        Format::Imdf => open_imdf(path, options),
     }
 }
 
@@ -173,12 +176,28 @@ fn open_dxf(path: &Path, options: &Options) -> Result<Building, Error> {
     dxf::parse(&stem(path), &plans, &options.layers, options.storey_m)
 }
 
+fn open_imdf(path: &Path, options: &Options) -> Result<Building, Error> {
+    let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new(".")) };
+    let paths = imdf::KINDS.map(|kind| (kind, folder.join(format!("{kind}.geojson"))));
+    let mut parts = Vec::new();
+    for (kind, path) in paths.iter().filter(|(_, path)| path.is_file()) {
+        parts.push((*kind, text(path)?, shown(path)));
+    }
+    let parts: Vec<_> = parts.iter().map(|(kind, text, file)| imdf::Part { kind, text, file }).collect();
+    imdf::parse(&folder_name(folder), &parts, options.storey_m)
+}
+
+/// What a folder is called, also one that is written as a dot.
+fn folder_name(folder: &Path) -> String {
+    fs::canonicalize(folder).map_or_else(|_| stem(folder), |folder| stem(&folder))
+}
+
 const XYZ10_MAP: &str = "geojson_map.json";
 const XYZ10_INFO: &str = "floor_info.json";
 
 fn open_xyz10(path: &Path) -> Result<Building, Error> {
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new(".")) };
-    let folder_name = fs::canonicalize(folder).map_or_else(|_| stem(folder), |folder| stem(&folder));
+    let folder_name = folder_name(folder);
     let map = folder.join(XYZ10_MAP);
     let number = floor_number(&folder_name).unwrap_or(0);
     xyz10::parse(&folder_name, number, &text(&map)?, &text(&folder.join(XYZ10_INFO))?, &shown(&map))

@@ -18,6 +18,9 @@ fn of_folder(path: &Path) -> Result<Format, Error> {
     if has(XYZ10_MAP) && has(XYZ10_INFO) {
         return Ok(Format::Xyz10);
     }
+    if has("level.geojson") && has("unit.geojson") {
+        return Ok(Format::Imdf);
+    }
     if let Some(first) = files(path, "geojson")?.first()
         && text(first)?.contains("\"ifc_class\"")
     {
@@ -26,7 +29,10 @@ fn of_folder(path: &Path) -> Result<Format, Error> {
     if !files(path, "dxf")?.is_empty() {
         return Ok(Format::Dxf);
     }
-    Err(unknown(path, "the folder holds neither floors with IFC classes or in DXF nor a floor_info.json"))
+    Err(unknown(
+        path,
+        "the folder holds neither floors with IFC classes or in DXF, nor a floor_info.json or a unit.geojson",
+    ))
 }
 
 fn of_file(path: &Path) -> Result<Format, Error> {
@@ -44,6 +50,8 @@ fn of_file(path: &Path) -> Result<Format, Error> {
         Ok(Format::Hcu)
     } else if path.file_name().is_some_and(|name| name == XYZ10_MAP) {
         Ok(Format::Xyz10)
+    } else if text.contains("\"feature_type\"") {
+        Ok(Format::Imdf)
     } else if text.trim_start().starts_with('<') && text.contains("<osm") {
         Ok(Format::Osm)
     } else {
