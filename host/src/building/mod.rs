@@ -25,6 +25,7 @@ pub mod open;
 pub mod opening;
 pub mod osm;
 pub mod picture;
+pub mod ros;
 pub mod route;
 #[cfg(test)]
 mod same;

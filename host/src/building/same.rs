@@ -34,7 +34,7 @@ fn places(floor: &Floor) -> Vec<Point> {
 
 /// Whether all walls of one floor lie on those of the other.
 #[track_caller]
-fn covered(by: &Floor, floor: &Floor, tolerance: f64) {
+pub(super) fn assert_covered(by: &Floor, floor: &Floor, tolerance: f64) {
     for place in places(floor) {
         let distance = |wall: &Segment| geometry::distance(geometry::nearest(wall, place), place);
         let least = by.walls.iter().map(distance).fold(f64::INFINITY, f64::min);
@@ -52,8 +52,8 @@ pub(super) fn assert_same(read: &Building, written: &Building, offset: Point, to
     for (read, written) in read.floors.iter().zip(&written.floors) {
         assert_eq!(read.number, written.number);
         assert!((read.height_m - written.height_m).abs() < 1e-9);
-        covered(read, written, tolerance);
-        covered(written, read, tolerance);
+        assert_covered(read, written, tolerance);
+        assert_covered(written, read, tolerance);
         assert_eq!(read.doors.len(), written.doors.len());
         for door in &written.doors {
             let far = |line: &Segment| {

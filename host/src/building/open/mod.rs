@@ -6,7 +6,7 @@ use super::dxf::{self, Layers, PlanFile};
 use super::error::Error;
 use super::hcu::FloorFile;
 use super::model::Building;
-use super::{geojson, hcu, imdf, osm, xyz10};
+use super::{geojson, hcu, imdf, osm, ros, xyz10};
 use recognise::recognise;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,6 +26,8 @@ pub enum Format {
     Dxf,
     /// Indoor Mapping Data Format: the folder of an unpacked archive, or a file in it
     Imdf,
+    /// A map of ROS map_server: a YAML file with its image, or a folder with one for each floor
+    Ros,
 }
 
 /// What files may leave open.
@@ -65,6 +67,7 @@ pub fn open(path: &Path, options: &Options) -> Result<Building, Error> {
         Format::Osm => osm::parse(&stem(path), &text(path)?, &shown(path), options.storey_m),
         Format::Dxf => open_dxf(path, options),
         Format::Imdf => open_imdf(path, options),
+        Format::Ros => open_ros(path, options),
     }
 }
 
@@ -158,22 +161,43 @@ fn open_hcu(path: &Path, options: &Options) -> Result<Building, Error> {
     hcu::parse(&stem(path), &files)
 }
 
+/// Files of one floor each: number and name of the floor. One file alone may be called like the building.
+fn floor_files(path: &Path, ending: &str) -> Result<Vec<(i32, String, PathBuf)>, Error> {
+    let paths = if path.is_dir() { files(path, ending)? } else { vec![path.to_owned()] };
+    let is_alone = paths.len() == 1;
+    let floor = |path: PathBuf| {
+        let name = stem(&path);
+        match floor_number(&name) {
+            Some(number) => Ok((number, name, path)),
+            None if is_alone => Ok((0, "0".to_owned(), path)),
+            None => Err(unknown(&path, "the name of the file must be that of the floor, as EG, 1OG or 2UG")),
+        }
+    };
+    paths.into_iter().map(floor).collect()
+}
+
 fn open_dxf(path: &Path, options: &Options) -> Result<Building, Error> {
-    let paths = if path.is_dir() { files(path, "dxf")? } else { vec![path.to_owned()] };
     let mut plans = Vec::new();
-    for path in &paths {
-        let name = stem(path);
-        let (number, name) = match floor_number(&name) {
-            Some(number) => (number, name),
-            // One file may be called like the building: its floors are in the names of its layers, or it has one.
-            None if paths.len() == 1 => (0, "0".to_owned()),
-            None => return Err(unknown(path, "the name of the file must be that of the floor, as EG, 1OG or 2UG")),
-        };
-        plans.push((number, name, shown(path), bytes(path)?));
+    for (number, name, path) in floor_files(path, "dxf")? {
+        plans.push((number, name, shown(&path), bytes(&path)?));
     }
     let plans: Vec<_> =
         plans.iter().map(|(number, name, file, bytes)| PlanFile { number: *number, name, bytes, file }).collect();
     dxf::parse(&stem(path), &plans, &options.layers, options.storey_m)
+}
+
+fn open_ros(path: &Path, options: &Options) -> Result<Building, Error> {
+    let mut maps = Vec::new();
+    for (number, name, path) in floor_files(path, "yaml")? {
+        let info = ros::Info::parse(&text(&path)?, &shown(&path))?;
+        let image = bytes(&path.with_file_name(&info.image))?;
+        maps.push((number, name, shown(&path), info, image));
+    }
+    let maps: Vec<_> = maps
+        .iter()
+        .map(|(number, name, file, info, image)| ros::MapFile { number: *number, name, info, image, file })
+        .collect();
+    ros::parse(&stem(path), &maps, options.storey_m)
 }
 
 fn open_imdf(path: &Path, options: &Options) -> Result<Building, Error> {

@@ -1,8 +1,8 @@
 //! Tells the format of a building by what is in the file or folder.
 
 use super::{Format, XYZ10_INFO, XYZ10_MAP, bytes, files, text, unknown};
-use crate::building::dxf;
 use crate::building::error::Error;
+use crate::building::{dxf, ros};
 use std::path::Path;
 
 /// Which format it is.
@@ -31,7 +31,7 @@ fn of_folder(path: &Path) -> Result<Format, Error> {
     }
     Err(unknown(
         path,
-        "the folder holds neither floors with IFC classes or in DXF, nor a floor_info.json or a unit.geojson",
+        "the folder holds neither floors with IFC classes, in DXF or as maps, nor a floor_info.json or a unit.geojson",
     ))
 }
 
@@ -54,6 +54,8 @@ fn of_file(path: &Path) -> Result<Format, Error> {
         Ok(Format::Imdf)
     } else if text.trim_start().starts_with('<') && text.contains("<osm") {
         Ok(Format::Osm)
+    } else if ros::is_info(&text) {
+        Ok(Format::Ros)
     } else {
         Err(unknown(path, "nothing in it tells which format it is; --format does"))
     }
