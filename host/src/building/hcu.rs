@@ -89,7 +89,7 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
             }
         }
     }
-    floor.walls = opening::cut(&floor.walls, &doors);
+    floor.walls = opening::cut(&floor.walls, &doors)?;
     Ok(floor)
 }
 
