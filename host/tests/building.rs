@@ -157,6 +157,19 @@ fn plans_of_other_formats_are_recognised_converted_and_without_errors() {
         said(folder, &["convert", &output, "again.geojson", "--force"]);
         assert_eq!(text, std::fs::read_to_string(folder.join("again.geojson")).unwrap(), "{plan}");
     }
+    // A folder of floors is recognised, too.
+    for (name, beside) in [("house.dxf", None), ("house.yaml", Some("house.pgm"))] {
+        let ending = name.split_once('.').unwrap().1;
+        std::fs::create_dir(folder.join(ending)).unwrap();
+        for floor in ["EG", "1OG"] {
+            std::fs::copy(folder.join(name), folder.join(format!("{ending}/{floor}.{ending}"))).unwrap();
+        }
+        if let Some(image) = beside {
+            std::fs::copy(folder.join(image), folder.join(ending).join(image)).unwrap();
+        }
+        let told = said(folder, &["show", ending, "--storey", "4", "--out", "pictures"]);
+        assert!(told.contains("EG") && told.contains("1OG") && told.contains("4.00"), "{told}");
+    }
     std::fs::write(folder.join("layers.toml"), "walls = ['Raum']\nrooms = []").unwrap();
     said(folder, &["show", "house.dxf", "--layers", "layers.toml", "--out", "pictures"]);
     std::fs::write(folder.join("layers.toml"), "wals = ['Raum']").unwrap();

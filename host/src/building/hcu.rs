@@ -93,7 +93,7 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
             }
         }
     }
-    floor.walls = opening::cut(&floor.walls, &doors);
+    floor.walls = opening::cut(&floor.walls, &doors)?;
     let rooms: Vec<Outline> = floor.rooms.iter().map(|room| room.outline.clone()).collect();
     floor.walls.extend(open_edges(&rooms, solids));
     Ok(floor)

@@ -12,8 +12,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// More walls than this no floor has.
 const MOST_WALLS: usize = 500_000;
-/// So often an end is held against a wall, on a floor with very many walls in one place.
-const MOST_LOOKS: usize = 100_000_000;
+/// All walls of a floor together are no longer: those of 100 000 m² of offices have 50 km. **Units:** m.
+const LONGEST_M: f64 = 2e6;
+/// So often an end is held against a metre of wall, on a floor with very many walls in one place.
+const MOST_LOOKS: usize = 20_000_000;
 /// Pieces go straight on if they turn by less than 1 degree.
 const STRAIGHT: f64 = 0.999_85;
 
@@ -27,6 +29,10 @@ pub fn merged(walls: &[Segment], tolerance: f64) -> Result<Vec<Segment>, Error> 
     }
     if let Some(wall) = walls.iter().find(|wall| !wall.iter().all(is_place)) {
         return Err(Error::Model(format!("a wall from {:?} to {:?} is too far from the origin", wall[0], wall[1])));
+    }
+    let total: f64 = walls.iter().map(geometry::length).sum();
+    if total > LONGEST_M {
+        return Err(Error::Model(format!("the walls of a floor are {:.0} km long, all together", total / 1e3)));
     }
     let mut corners = Corners { tolerance, places: Vec::new(), cells: BTreeMap::new() };
     let ends: Vec<[usize; 2]> = walls.iter().map(|wall| wall.map(|point| corners.of(point))).collect();
@@ -68,7 +74,7 @@ fn divided(corners: &Corners, ends: Vec<[usize; 2]>) -> Result<BTreeSet<[usize; 
         let mut on = vec![(0.0, a), (length, b)];
         for bounds in pieces(&wall, 1.0).filter_map(geometry::bounds) {
             let near = index.near(bounds, corners.tolerance);
-            looks += near.len();
+            looks += 1 + near.len();
             for corner in near.into_iter().filter(|&corner| corner != a && corner != b) {
                 let foot = geometry::nearest(&wall, corners.places[corner]);
                 if geometry::distance(foot, corners.places[corner]) <= corners.tolerance {
@@ -156,6 +162,18 @@ mod tests {
             assert!(merged(&[[[0.0, 0.0], [bad, 0.0]]], 0.01).unwrap_err().to_string().contains("too far"));
         }
         assert_eq!(merged(&[[[1.0, 1.0], [1.001, 1.0]]], 0.01).unwrap(), Vec::<Segment>::new());
+    }
+
+    #[test]
+    fn more_than_a_building_has_is_refused() {
+        let message = |walls: &[Segment]| merged(walls, 0.01).unwrap_err().to_string();
+        assert!(message(&vec![[[0.0; 2], [1.0, 0.0]]; MOST_WALLS + 1]).contains("500001 walls"));
+        assert!(message(&vec![[[0.0, 0.0], [5e3, 0.0]]; 401]).contains("2005 km"));
+        // All walls of a square metre, two thousand corners.
+        let corners: Vec<Point> = (0..2_000).map(|i| [f64::from(i % 40) * 0.024, f64::from(i / 40) * 0.019]).collect();
+        let walls: Vec<Segment> =
+            (0..100_000).map(|i| [corners[i % 2_000], corners[(i * 7 + i / 2_000 + 1) % 2_000]]).collect();
+        assert!(message(&walls).contains("lie in one place"));
     }
 
     proptest! {

@@ -4,6 +4,7 @@
 //! the gap. Only what lies along an opening is taken out of a wall: a partition that ends beside the frame, and the short
 //! remains between a frame and a corner that other walls meet, stay as they are, or the rooms behind them would leak.
 
+use super::error::Error;
 use super::geometry::{self, Outline, Point, Segment};
 use super::index::{Index, pieces};
 use super::model::is_place;
@@ -24,20 +25,38 @@ const STRAIGHT: f64 = 0.985;
 /// So near to the wall that holds a place are those that go on from it. **Units:** m.
 const SAME_M: f64 = 0.03;
 
+/// More doors than this no floor has.
+pub(super) const MOST_DOORS: usize = 20_000;
+/// So often an opening is held against a metre of wall, on a floor with very many doors in one place.
+const MOST_LOOKS: usize = 20_000_000;
+
 /// What openings leave of walls.
-pub fn cut(walls: &[Segment], openings: &[Opening]) -> Vec<Segment> {
+///
+/// # Errors
+/// When there are more openings than a floor has doors, or very many in one place.
+pub fn cut(walls: &[Segment], openings: &[Opening]) -> Result<Vec<Segment>, Error> {
+    if openings.len() > MOST_DOORS {
+        return Err(Error::Model(format!("a floor has {} doors, more than {MOST_DOORS}", openings.len())));
+    }
     let openings: Vec<Opening> = openings.iter().filter(|opening| opening.line.iter().all(is_place)).copied().collect();
     let lines: Vec<Segment> = openings.iter().map(|opening| opening.line).collect();
     let reach = openings.iter().map(|opening| opening.depth_m).fold(0.0, f64::max);
     let index = Index::of(&lines);
-    let mut left = Vec::new();
+    let (mut left, mut looks) = (Vec::new(), 0);
     for wall in walls {
         if !wall.iter().all(is_place) {
             left.push(*wall);
             continue;
         }
-        let mut near: Vec<usize> =
-            pieces(wall, 1.0).filter_map(geometry::bounds).flat_map(|bounds| index.near(bounds, reach)).collect();
+        let mut near = Vec::new();
+        for bounds in pieces(wall, 1.0).filter_map(geometry::bounds) {
+            let found = index.near(bounds, reach);
+            looks += 1 + found.len();
+            near.extend(found);
+        }
+        if looks > MOST_LOOKS {
+            return Err(Error::Model("too many doors of a floor lie in one place".to_owned()));
+        }
         near.sort_unstable();
         near.dedup();
         let mut remains = vec![*wall];
@@ -46,7 +65,7 @@ pub fn cut(walls: &[Segment], openings: &[Opening]) -> Vec<Segment> {
         }
         left.extend(remains);
     }
-    left
+    Ok(left)
 }
 
 impl Opening {
@@ -142,7 +161,7 @@ mod tests {
         let at_frame = [[2.0, 0.0], [2.0, 3.0]];
         let before = [[2.5, 0.1], [2.5, 3.0]];
         let through = [[2.5, -3.0], [2.5, 3.0]];
-        let left = cut(&[WALL, parallel, beyond, at_frame, before, through], &[DOOR]);
+        let left = cut(&[WALL, parallel, beyond, at_frame, before, through], &[DOOR]).unwrap();
         assert_eq!(left.len(), 2 + 2 + 1 + 1 + 1 + 2, "{left:?}");
         for kept in [beyond, at_frame, before] {
             assert!(left.contains(&kept), "{kept:?}");
@@ -183,14 +202,14 @@ mod tests {
         ) {
             prop_assume!(geometry::distance(a, b) > 0.2);
             let opening = Opening { line: [a, b], depth_m: 0.2 };
-            let left = cut(&walls, &[opening]);
+            let left = cut(&walls, &[opening]).unwrap();
             let total = |walls: &[Segment]| walls.iter().map(geometry::length).sum::<f64>();
             prop_assert!(total(&left) <= total(&walls) + 1e-9);
             for wall in &left {
                 prop_assert!(!crosses(wall, &opening.line), "{:?}", wall);
             }
             // What has been cut is not cut again; corners of the rectangle move by rounding.
-            prop_assert!((total(&cut(&left, &[opening])) - total(&left)).abs() < 1e-6);
+            prop_assert!((total(&cut(&left, &[opening]).unwrap()) - total(&left)).abs() < 1e-6);
         }
     }
 }

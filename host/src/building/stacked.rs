@@ -1,7 +1,7 @@
 //! Stairs and elevators drawn floor by floor are joined where they lie above each other.
 
 use super::error::Error;
-use super::geometry::{self, Outline};
+use super::geometry::{self, Outline, Point};
 use super::model::{Connector, ConnectorKind};
 use std::collections::BTreeSet;
 
@@ -33,22 +33,23 @@ pub(super) fn join(mut parts: Vec<Part>) -> Result<Vec<Connector>, Error> {
     }
     parts.sort_by_key(|part| part.floor);
     let mut connectors: Vec<Connector> = Vec::new();
-    let mut names: Vec<Option<String>> = Vec::new();
+    let (mut names, mut highest): (Vec<Option<String>>, Vec<(i32, Point)>) = (Vec::new(), Vec::new());
     for part in parts {
         let middle = geometry::centre(&part.outline);
-        let far = |connector: &Connector| match connector.outlines.last() {
-            Some((floor, below)) if connector.kind == part.kind && *floor < part.floor => {
-                geometry::distance(geometry::centre(below), middle)
-            }
-            _ => f64::INFINITY,
+        let far = |number: &usize| {
+            let (floor, below) = highest[*number];
+            let may_join = connectors[*number].kind == part.kind && floor < part.floor;
+            if may_join { geometry::distance(below, middle) } else { f64::INFINITY }
         };
-        let below = (0..connectors.len()).min_by(|a, b| far(&connectors[*a]).total_cmp(&far(&connectors[*b])));
-        match below.filter(|&number| far(&connectors[number]) < ABOVE_M) {
+        let below = (0..connectors.len()).min_by(|a, b| far(a).total_cmp(&far(b)));
+        match below.filter(|number| far(number) < ABOVE_M) {
             Some(number) => {
+                highest[number] = (part.floor, middle);
                 connectors[number].outlines.push((part.floor, part.outline));
                 names[number] = names[number].take().or(part.name);
             }
             None => {
+                highest.push((part.floor, middle));
                 names.push(part.name);
                 let outlines = vec![(part.floor, part.outline)];
                 connectors.push(Connector { name: String::new(), kind: part.kind, outlines, way: Vec::new() });

@@ -8,7 +8,7 @@ use crate::building::geometry::{self, Outline, Point, Segment};
 use crate::building::index::Index;
 use crate::building::merge::merged;
 use crate::building::model::{ConnectorKind, Door, Entrance, Floor, Room};
-use crate::building::opening::{self, Opening};
+use crate::building::opening::{self, MOST_DOORS, Opening};
 use crate::building::stacked::Part;
 
 /// Ends that were meant to meet do so within this. **Units:** m.
@@ -19,8 +19,11 @@ const BESIDE_M: f64 = 0.3;
 const NAME_M: f64 = 3.0;
 /// Side of a cabin that is only a point. **Units:** m.
 const CABIN_M: f64 = 1.6;
-/// More rooms, or texts, than this no floor has.
+/// More rooms, or texts, than this no floor has; nor more entrances than that.
 const MOST_ROOMS: usize = 20_000;
+const MOST_ENTRANCES: usize = 1_000;
+/// So many corners of rooms are looked at to find the names in them.
+const MOST_LOOKS: usize = 500_000_000;
 
 /// A floor in the making. **Units:** m; **Frame:** drawing.
 #[derive(Debug, Default)]
@@ -93,6 +96,15 @@ impl Sheet {
         origin: Point,
         door_width: f64,
     ) -> Result<(Floor, Vec<Entrance>, Vec<Part>), Error> {
+        for (count, most, what) in [
+            (self.doors.len().max(self.swings.len()).max(self.door_points.len()), MOST_DOORS, "doors"),
+            (self.entrances.len().max(self.entrance_texts.len()), MOST_ENTRANCES, "entrances or their names"),
+            (self.rooms.len().max(self.texts.len()), MOST_ROOMS, "rooms or their names"),
+        ] {
+            if count > most {
+                return Err(Error::Model(format!("floor {} has {count} {what}, more than {most}", floor.number)));
+            }
+        }
         let moved = |point: &Point| [point[0] - origin[0], point[1] - origin[1]];
         let moved_line = |line: &Segment| [moved(&line[0]), moved(&line[1])];
         let walls = merged(&self.walls.iter().map(moved_line).collect::<Vec<_>>(), SAME_M)?;
@@ -120,7 +132,7 @@ impl Sheet {
         lines.extend(self.door_points.iter().filter_map(on_wall));
         lines.retain(|line| geometry::length(line) > SAME_M);
         let openings: Vec<Opening> = lines.iter().map(|line| Opening { line: *line, depth_m: BESIDE_M }).collect();
-        floor.walls = opening::cut(&walls, &openings);
+        floor.walls = opening::cut(&walls, &openings)?;
         floor.doors = lines.into_iter().map(|line| Door { line, name: None }).collect();
         floor.rooms = self.rooms(moved)?;
         let entrances = self.entrances.iter().map(|(place, line)| {
@@ -147,25 +159,28 @@ impl Sheet {
 
     /// Rooms with the highest of the texts in them as their name.
     fn rooms(&self, moved: impl Fn(&Point) -> Point) -> Result<Vec<Room>, Error> {
-        if self.rooms.len().max(self.texts.len()) > MOST_ROOMS {
-            return Err(Error::Model(format!("a floor has more than {MOST_ROOMS} rooms or names of rooms")));
-        }
         let boxes: Vec<[Point; 2]> =
             self.rooms.iter().map(|outline| geometry::bounds(outline.iter().copied()).unwrap_or_default()).collect();
         let areas: Vec<f64> = self.rooms.iter().map(|outline| geometry::area(outline).abs()).collect();
         let mut names: Vec<Option<&(Point, String)>> = vec![None; self.rooms.len()];
+        let mut looks = 0;
         for text in self.texts.iter().filter(|(_, text)| !text.is_empty()) {
-            let holds = |room: &usize| {
+            let mut holds = |room: &usize| {
                 let [low, high] = boxes[*room];
-                (0..2).all(|axis| (low[axis]..=high[axis]).contains(&text.0[axis]))
-                    && geometry::contains(&self.rooms[*room], text.0)
+                let may_hold = (0..2).all(|axis| (low[axis]..=high[axis]).contains(&text.0[axis]));
+                looks += if may_hold { self.rooms[*room].len() } else { 1 };
+                may_hold && looks <= MOST_LOOKS && geometry::contains(&self.rooms[*room], text.0)
             };
-            let smallest = (0..self.rooms.len()).filter(holds).min_by(|a, b| areas[*a].total_cmp(&areas[*b]));
+            let smallest =
+                (0..self.rooms.len()).filter(|room| holds(room)).min_by(|a, b| areas[*a].total_cmp(&areas[*b]));
             if let Some(room) = smallest
                 && names[room].is_none_or(|(place, _)| place[1] < text.0[1])
             {
                 names[room] = Some(text);
             }
+        }
+        if looks > MOST_LOOKS {
+            return Err(Error::Model("too many rooms of a floor lie in one place".to_owned()));
         }
         let room = |(index, outline): (usize, &Outline)| Room {
             name: names[index].map_or_else(|| format!("room {}", index + 1), |(_, name)| name.clone()),

@@ -14,8 +14,10 @@ const SAME_M: f64 = 0.02;
 const BESIDE_M: f64 = 0.3;
 /// So far on both sides of a border it is asked which unit is there. **Units:** m.
 const SIDE_M: f64 = 0.05;
-/// So often it is asked on a floor with very many units.
+/// So many corners of units are looked at for that.
 const MOST_LOOKS: usize = 500_000_000;
+/// More entrances than this no floor has.
+const MOST_ENTRANCES: usize = 1_000;
 
 /// Between these there is no wall.
 const OPEN: [&str; 12] = [
@@ -135,14 +137,16 @@ impl Sheet {
     /// When a wall is too far away, or there is too much of it.
     pub fn done(self, mut floor: Floor) -> Result<(Floor, Vec<Entrance>), Error> {
         let borders = merged(&self.borders, SAME_M)?;
-        if borders.len().saturating_mul(self.units.len()) > MOST_LOOKS {
-            return Err(Error::Model(format!("floor {} has too many units: {}", floor.number, self.units.len())));
+        let mut looks = 0;
+        let mut walls: Vec<Segment> =
+            borders.into_iter().filter(|border| !self.is_passed(border, &mut looks)).collect();
+        if looks > MOST_LOOKS || self.entrances.len() > MOST_ENTRANCES {
+            return Err(Error::Model(format!("floor {} has too many units or entrances", floor.number)));
         }
-        let mut walls: Vec<Segment> = borders.into_iter().filter(|border| !self.is_passed(border)).collect();
         walls.extend(&self.walls);
         let openings: Vec<Opening> =
             self.doors.iter().map(|door| Opening { line: door.line, depth_m: BESIDE_M }).collect();
-        floor.walls = opening::cut(&merged(&walls, SAME_M)?, &openings);
+        floor.walls = opening::cut(&merged(&walls, SAME_M)?, &openings)?;
         (floor.rooms, floor.doors) = (self.rooms, self.doors);
         let inside = |point: Point| self.units.iter().any(|unit| geometry::contains(&unit.outline, point));
         let entrance = |(line, name): &(Segment, String)| Entrance {
@@ -155,21 +159,23 @@ impl Sheet {
     }
 
     /// Whether one goes over a border freely: both sides are open.
-    fn is_passed(&self, border: &Segment) -> bool {
+    fn is_passed(&self, border: &Segment, looks: &mut usize) -> bool {
         let [a, b] = *border;
         let length = geometry::length(border).max(1e-9);
         let middle = geometry::between(a, b, 0.5);
         let across = [-(b[1] - a[1]) / length * SIDE_M, (b[0] - a[0]) / length * SIDE_M];
-        [1.0, -1.0].into_iter().all(|side| self.is_open([middle[0] + side * across[0], middle[1] + side * across[1]]))
+        let side = |side: f64| [middle[0] + side * across[0], middle[1] + side * across[1]];
+        [1.0, -1.0].into_iter().all(|sign| self.is_open(side(sign), looks))
     }
 
     /// Whether a place is in an open unit and in no other.
-    fn is_open(&self, point: Point) -> bool {
+    fn is_open(&self, point: Point, looks: &mut usize) -> bool {
         let mut open = false;
         for unit in &self.units {
             let [low, high] = unit.bounds;
             let may_hold = (0..2).all(|axis| (low[axis]..=high[axis]).contains(&point[axis]));
-            if may_hold && geometry::contains(&unit.outline, point) {
+            *looks += if may_hold { unit.outline.len() } else { 1 };
+            if may_hold && *looks <= MOST_LOOKS && geometry::contains(&unit.outline, point) {
                 if !unit.is_open {
                     return false;
                 }

@@ -29,6 +29,11 @@ fn of_folder(path: &Path) -> Result<Format, Error> {
     if !files(path, "dxf")?.is_empty() {
         return Ok(Format::Dxf);
     }
+    if let Some(first) = files(path, "yaml")?.first()
+        && ros::is_info(&text(first)?)
+    {
+        return Ok(Format::Ros);
+    }
     Err(unknown(
         path,
         "the folder holds neither floors with IFC classes, in DXF or as maps, nor a floor_info.json or a unit.geojson",
@@ -52,7 +57,7 @@ fn of_file(path: &Path) -> Result<Format, Error> {
         Ok(Format::Xyz10)
     } else if text.contains("\"feature_type\"") {
         Ok(Format::Imdf)
-    } else if text.trim_start().starts_with('<') && text.contains("<osm") {
+    } else if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') && text.contains("<osm") {
         Ok(Format::Osm)
     } else if ros::is_info(&text) {
         Ok(Format::Ros)

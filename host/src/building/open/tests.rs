@@ -1,6 +1,7 @@
 //! Opens real plans, and tells what is none.
 
 use super::*;
+use crate::building::geometry;
 use crate::building::{ConnectorKind, Floor, Georeference, Room};
 use crate::recording::recordings_dir;
 
@@ -75,6 +76,24 @@ fn the_mall_has_shops_and_walkers_stay_between_them() {
         let inside = points.iter().filter(in_shop).count();
         // Most of the walk is in the corridors; what the shops are called decides nothing.
         assert!(inside * 4 <= points.len(), "{inside} of {} in {name}", points.len());
+    }
+}
+
+#[test]
+fn the_hall_that_a_robot_mapped_is_closed() {
+    let Some(folder) = recorded("map_nav2_depot") else { return };
+    let building = open(&folder, &Options::default()).unwrap();
+    assert_eq!(building.floors, open(&folder.join("depot.yaml"), &Options::default()).unwrap().floors);
+    // 604 by 307 pixels of 5 cm, with walls at their borders.
+    let [low, high] = building.bounds().unwrap();
+    assert!(low.iter().all(|value| (0.0..0.2).contains(value)), "{low:?}");
+    assert!((high[0] - 30.2).abs() < 0.2 && (high[1] - 15.35).abs() < 0.2, "{high:?}");
+    // From the middle no straight way leads out.
+    let walls = &building.floors[0].walls;
+    for angle in 0..720 {
+        let (sin, cos) = (f64::from(angle) / 2.0).to_radians().sin_cos();
+        let way = [[12.0, 8.0], [12.0 + 40.0 * cos, 8.0 + 40.0 * sin]];
+        assert!(walls.iter().any(|wall| geometry::crossing(&way, wall).is_some()), "{angle}");
     }
 }
 

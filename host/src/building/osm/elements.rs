@@ -45,8 +45,16 @@ pub struct Drawn {
     pub point: Option<Point>,
 }
 
-/// More buildings than this do not stand in one.
-const MOST_SHELLS: usize = 1_000;
+impl Drawn {
+    /// How many points it has.
+    pub fn count(&self) -> usize {
+        let lines = self.outlines.iter().chain(&self.holes).chain(&self.lines);
+        lines.map(Vec::len).sum::<usize>() + usize::from(self.point.is_some())
+    }
+}
+
+/// So many corners of outlines of buildings are looked at to find what is in them.
+const MOST_LOOKS: usize = 500_000_000;
 /// More elements than this are no building: a large station has ten thousand.
 const MOST_ELEMENTS: usize = 200_000;
 
@@ -134,7 +142,7 @@ pub fn used(data: &Data) -> Result<Vec<Element<'_>>, String> {
         .map(|node| node.place)
         .collect();
     let bounds = geometry::bounds(indoors.iter().copied());
-    let mut shells = 0;
+    let mut looks = 0;
     let mut kept = Vec::new();
     for element in found {
         if element.is_shell() && !element.is_door() {
@@ -143,11 +151,11 @@ pub fn used(data: &Data) -> Result<Vec<Element<'_>>, String> {
             if (0..2).any(|axis| own[0][axis] > all[1][axis] || own[1][axis] < all[0][axis]) {
                 continue;
             }
-            shells += 1;
-            if shells > MOST_SHELLS {
-                return Err(format!("more than {MOST_SHELLS} buildings overlap what is indoors"));
+            let is_around = holds(&element, data, own, &indoors, &mut looks);
+            if looks > MOST_LOOKS {
+                return Err("too many buildings overlap what is indoors".to_owned());
             }
-            if !holds(&element, data, own, &indoors) {
+            if !is_around {
                 continue;
             }
         }
@@ -157,15 +165,19 @@ pub fn used(data: &Data) -> Result<Vec<Element<'_>>, String> {
 }
 
 /// Whether the outline of a building is around anything indoors.
-fn holds(shell: &Element<'_>, data: &Data, [low, high]: [Point; 2], indoors: &[Point]) -> bool {
+fn holds(shell: &Element<'_>, data: &Data, [low, high]: [Point; 2], indoors: &[Point], looks: &mut usize) -> bool {
     let places: BTreeMap<i64, Point> =
         shell.nodes().filter_map(|node| Some((node, data.nodes.get(&node)?.place))).collect();
     let outlines = shell.drawn(&places).outlines;
     let within = |point: &&Point| (0..2).all(|axis| (low[axis]..=high[axis]).contains(&point[axis]));
     // A room in a corner begins on the outline itself.
     let corners: BTreeSet<[u64; 2]> = places.values().map(|place| place.map(f64::to_bits)).collect();
+    *looks += indoors.len();
     indoors.iter().filter(within).any(|point| {
-        corners.contains(&point.map(f64::to_bits)) || outlines.iter().any(|outline| geometry::contains(outline, *point))
+        *looks += corners.len();
+        *looks > MOST_LOOKS
+            || corners.contains(&point.map(f64::to_bits))
+            || outlines.iter().any(|outline| geometry::contains(outline, *point))
     })
 }
 

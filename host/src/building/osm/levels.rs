@@ -7,6 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A level in hundredths: half levels are levels, too.
 pub type Level = i32;
 
+/// A list of levels is no longer. **Units:** bytes.
+const LONGEST: usize = 2_000;
 /// The highest and, below the ground, the lowest level that is believed.
 const FARTHEST: f64 = 200.0;
 
@@ -17,7 +19,11 @@ const FARTHEST: f64 = 200.0;
 pub fn of(tags: &Tags) -> Result<BTreeSet<Level>, String> {
     let mut levels = BTreeSet::new();
     for key in ["level", "repeat_on"] {
-        for part in tags.get(key).unwrap_or_default().split([';', ',']).map(str::trim).filter(|part| !part.is_empty()) {
+        let text = tags.get(key).unwrap_or_default();
+        if text.len() > LONGEST {
+            return Err(format!("'{key}' has {} characters, more than {LONGEST}", text.len()));
+        }
+        for part in text.split([';', ',']).map(str::trim).filter(|part| !part.is_empty()) {
             let range =
                 range(part).ok_or_else(|| format!("'{key}={part}' is no level: expected such as 0, 0;1 or 0-2"))?;
             levels.extend(range);

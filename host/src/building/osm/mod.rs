@@ -56,15 +56,16 @@ pub fn parse(name: &str, text: &str, file: &str, storey_m: f64) -> Result<Buildi
         })
         .collect();
     let meant = Meant::of(&used, &levels);
-    let mut walls = 0;
+    let mut points = 0;
     for element in &used {
         let drawn = element.drawn(&places);
         for level in meant.levels(element) {
-            if let Some(sheet) = sheets.get_mut(&level) {
-                walls += sheet.add(element, &drawn).map_err(|what| wrong(format!("{}: {what}", element.name)))?;
+            points += drawn.count();
+            if points > MOST_POINTS {
+                return Err(wrong(format!("its floors have more than {MOST_POINTS} points, all together")));
             }
-            if walls > MOST_WALLS {
-                return Err(wrong(format!("it has more than {MOST_WALLS} walls")));
+            if let Some(sheet) = sheets.get_mut(&level) {
+                sheet.add(element, &drawn).map_err(|what| wrong(format!("{}: {what}", element.name)))?;
             }
         }
     }
@@ -80,8 +81,8 @@ pub fn parse(name: &str, text: &str, file: &str, storey_m: f64) -> Result<Buildi
     building.assembled()
 }
 
-/// More walls than this no building has, all floors together.
-const MOST_WALLS: usize = 1_000_000;
+/// More points than this no building has, all floors together.
+const MOST_POINTS: usize = 4_000_000;
 
 /// The levels of elements that name none.
 struct Meant<'a> {

@@ -6,7 +6,7 @@ use crate::building::geometry::{self, Outline, Point, Segment};
 use crate::building::index::Index;
 use crate::building::merge::merged;
 use crate::building::model::{Door, Entrance, Floor, Room};
-use crate::building::opening::{self, Opening};
+use crate::building::opening::{self, MOST_DOORS, Opening};
 use crate::building::stacked::Part;
 
 /// A door whose width nobody gave: the usual one of an office. **Units:** m.
@@ -20,6 +20,8 @@ const CABIN_M: f64 = 1.6;
 const SAME_M: f64 = 0.02;
 /// A door lies on its wall or so far beside it. **Units:** m.
 const BESIDE_M: f64 = 0.3;
+/// More entrances than this no floor has.
+const MOST_ENTRANCES: usize = 1_000;
 
 /// A floor in the making.
 #[derive(Debug, Default)]
@@ -50,12 +52,11 @@ impl Sheet {
         Self { floor, ..Self::default() }
     }
 
-    /// Draws an element; tells how many walls it has.
+    /// Draws an element.
     ///
     /// # Errors
     /// When a door has a width that is none.
-    pub fn add(&mut self, element: &Element<'_>, drawn: &Drawn) -> Result<usize, String> {
-        let before = self.walls.len();
+    pub fn add(&mut self, element: &Element<'_>, drawn: &Drawn) -> Result<(), String> {
         let tags = element.tags;
         let name = tags.first(&["name", "ref"]);
         let kind = tags.get("indoor").unwrap_or_default();
@@ -97,7 +98,7 @@ impl Sheet {
             let place = line.map(|line| geometry::between(line[0], line[1], 0.5)).or(drawn.point);
             self.doors.extend(place.map(|place| Drafted { line, place, width, name, entrance }));
         }
-        Ok(self.walls.len() - before)
+        Ok(())
     }
 
     /// The floor with its walls merged and cut, and where one comes in.
@@ -107,6 +108,11 @@ impl Sheet {
     pub fn done(mut self) -> Result<(Floor, Vec<Entrance>), Error> {
         let walls = merged(&self.walls, SAME_M)?;
         let index = Index::of(&walls);
+        let count = self.doors.iter().filter(|door| door.entrance.is_some()).count();
+        if count > MOST_ENTRANCES || self.doors.len() > MOST_DOORS {
+            let (number, doors) = (self.floor.number, self.doors.len());
+            return Err(Error::Model(format!("floor {number} has {doors} doors, {count} of them entrances: too many")));
+        }
         let mut entrances = Vec::new();
         for door in std::mem::take(&mut self.doors) {
             let on_wall = || opening::door_at(&index, door.place, door.width, BESIDE_M);
@@ -124,7 +130,7 @@ impl Sheet {
         }
         let openings: Vec<Opening> =
             self.floor.doors.iter().map(|door| Opening { line: door.line, depth_m: BESIDE_M }).collect();
-        self.floor.walls = opening::cut(&walls, &openings);
+        self.floor.walls = opening::cut(&walls, &openings)?;
         Ok((self.floor, entrances))
     }
 }

@@ -26,6 +26,7 @@ const SOUTH: usize = 3;
 /// When there are too many: the image is no map.
 pub fn walls(raster: &Raster) -> Result<Vec<Segment>, String> {
     let mut seen = vec![false; raster.occupied.len()];
+    let too_many = || format!("its image gives more than {MOST_WALLS} walls: is it a map?");
     let mut walls = Vec::new();
     for y in 0..raster.height as i64 {
         for x in 0..raster.width as i64 {
@@ -33,22 +34,26 @@ pub fn walls(raster: &Raster) -> Result<Vec<Segment>, String> {
             if !raster.occupied[cell] || seen[cell] || raster.at([x - 1, y]) {
                 continue;
             }
-            let corners = straightened(&corners(raster, [x, y], &mut seen));
+            let corners = corners(raster, [x, y], &mut seen).ok_or_else(too_many)?;
+            let corners = straightened(&corners);
             walls.extend(match corners[..] {
                 [a, b] => vec![[a, b]],
                 _ => geometry::sides(&corners).collect(),
             });
             if walls.len() > MOST_WALLS {
-                return Err(format!("its image gives more than {MOST_WALLS} walls: is it a map?"));
+                return Err(too_many());
             }
         }
     }
     Ok(walls)
 }
 
-/// The corners of the border that runs down the left side of a cell, with the region to its left. All left sides of cells on
-/// the border are marked as seen.
-fn corners(raster: &Raster, [x, y]: [i64; 2], seen: &mut [bool]) -> Vec<Point> {
+/// A border with more straight parts than this is that of no region of a map.
+const MOST_RUNS: usize = 2_000_000;
+
+/// The corners of the border that runs down the left side of a cell, with the region to its left; nothing if there are too
+/// many. All left sides of cells on the border are marked as seen.
+fn corners(raster: &Raster, [x, y]: [i64; 2], seen: &mut [bool]) -> Option<Vec<Point>> {
     let start = [x, y + 1];
     let (mut place, mut heading) = (start, SOUTH);
     // Each straight part: where it begins, its heading and its length.
@@ -60,6 +65,9 @@ fn corners(raster: &Raster, [x, y]: [i64; 2], seen: &mut [bool]) -> Vec<Point> {
         match runs.last_mut() {
             Some(run) if run.1 == heading => run.2 += 1,
             _ => runs.push((place, heading, 1)),
+        }
+        if runs.len() > MOST_RUNS {
+            return None;
         }
         let step = STEPS[heading];
         place = [place[0] + step[0], place[1] + step[1]];
@@ -92,7 +100,7 @@ fn corners(raster: &Raster, [x, y]: [i64; 2], seen: &mut [bool]) -> Vec<Point> {
             corners.push(to(length as f64));
         }
     }
-    corners
+    Some(corners)
 }
 
 /// The corners of a border that are needed.
