@@ -3,6 +3,7 @@
 //! GPX has no floors and no metres of uncertainty; they stand in extensions, beside the time of the clock. The elevation is
 //! the height above the origin of the building, which the description says.
 
+use super::pen::escaped;
 use super::walk::{Point, Walk, runs};
 use crate::building::georeference::Projection;
 use std::fmt::Write;
@@ -75,22 +76,6 @@ fn put(out: &mut String, point: &Point, projection: &Projection) -> Result<(), N
         point.step,
     );
     Ok(())
-}
-
-/// What XML takes for markup, and the characters that it cannot hold at all, in another way.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '\t' | '\n' | '\r' => out.push(' '),
-            control if control.is_control() => out.push('\u{fffd}'),
-            other => out.push(other),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -150,7 +150,7 @@ impl Pen {
 }
 
 /// Text as XML has it. Control characters, which XML 1.0 cannot hold at all, become spaces.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
