@@ -13,6 +13,7 @@ use super::resampling;
 use super::start::{self, Patch, Seeded, Start};
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// A bin of the adaptive number of particles. **Units:** m.
@@ -65,8 +66,8 @@ pub struct ParticleFilter {
     spread: Spread,
     /// Logarithm of the odds against the cloud, never below 0.
     against: f64,
-    /// The steps since these odds were last 0, and where the person was then.
-    doubtful: Vec<Step>,
+    /// The last steps since these odds were 0, at most [`MOST_AGAIN`], and where the person was then.
+    doubtful: VecDeque<Step>,
     undoubted: Vec<Cluster>,
     /// Steps in a row for which the place was clear.
     clear_steps: u32,
@@ -122,7 +123,7 @@ impl ParticleFilter {
             spread: Spread::of(&seeded),
             particles: seeded.particles,
             against: 0.0,
-            doubtful: Vec::new(),
+            doubtful: VecDeque::new(),
             undoubted: Vec::new(),
             clear_steps: 0,
             estimate: Estimate::default(),
@@ -148,8 +149,11 @@ impl ParticleFilter {
         let likelihood = moved.likelihood();
         let parents = if documented {
             self.draw_documented(&moved)
+        } else if self.judge(likelihood, step) {
+            moved = self.search_anew();
+            None
         } else {
-            if self.judge(likelihood, step) { self.search_anew(&mut moved) } else { self.draw(&moved) }
+            self.draw(&moved)
         };
         self.remember(parents.as_deref(), step.index);
         let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
@@ -185,32 +189,37 @@ impl ParticleFilter {
             self.doubtful.clear();
             self.undoubted.clone_from(&self.estimate.clusters);
         }
-        self.doubtful.push(*step);
+        // Who searches for long may doubt for long.
+        if self.doubtful.len() == MOST_AGAIN {
+            self.doubtful.pop_front();
+        }
+        self.doubtful.push_back(*step);
         // Whoever searches everywhere cannot be lost.
         self.against > f64::from(self.parameters.lost_odds) && self.estimate.state != State::Searching
     }
 
-    /// Looks for the person around where they were before the steps became doubtful, and goes through these steps again.
-    fn search_anew(&mut self, moved: &mut Moved) -> Option<Vec<usize>> {
+    /// Looks for the person around where they were before the steps became doubtful, and goes through these steps again; what
+    /// the last of them did to those that were sown.
+    fn search_anew(&mut self) -> Moved {
         self.against = 0.0;
         self.clear_steps = 0;
         self.estimate.state = State::Lost;
-        let mut steps = std::mem::take(&mut self.doubtful);
+        let steps = std::mem::take(&mut self.doubtful);
         let leaders = std::mem::take(&mut self.undoubted);
         // The cloud that is believed is here already.
         let believed = std::mem::take(&mut self.particles);
-        steps.drain(..steps.len().saturating_sub(MOST_AGAIN));
         self.sow_around(&leaders, LOST_RADIUS_M);
+        let mut moved = Moved::default();
         for step in &steps {
             self.number += 1;
-            *moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
-            self.draw(moved);
+            moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
+            self.draw(&moved);
         }
         let count = self.particles.len();
         weigh(&mut self.particles, (1.0 - BELIEVED_PART) * count as f32);
         self.particles.extend(believed);
         weigh(&mut self.particles[count..], BELIEVED_PART * count as f32);
-        None
+        moved
     }
 
     /// Sows new particles around the likeliest of `leaders` and, thinly, everywhere, in place of all there were.
