@@ -57,6 +57,7 @@ fn a_wrong_command_line_is_one_line_and_code_2() {
     assert!(refusal(home.path(), &["replay"], 2).contains("<FILE>"));
     assert!(refusal(home.path(), &["replay", "a.csv", "--owt", "b"], 2).contains("--owt"));
     assert!(refusal(home.path(), &["wander"], 2).contains("wander"));
+    assert!(refusal(home.path(), &["evaluate", "--suite", "building", "--walks", "0"], 2).contains("from 1 on"));
     assert!(refusal(home.path(), &["demo", "--seed", "many"], 2).contains("many"));
     assert!(refusal(home.path(), &["replay", "a.csv", "--origin", "91,0"], 2).contains("LAT,LON"));
     assert!(names(home.path()).is_empty());

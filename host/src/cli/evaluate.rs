@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.toml", requires = "suite")]
     particle: Option<PathBuf>,
     /// Walks from an unknown start in the suite 'building'
-    #[arg(long, value_name = "N", default_value_t = 200, requires = "suite")]
+    #[arg(long, value_name = "N", default_value_t = 200, requires = "suite", value_parser = some_walks)]
     walks: usize,
     /// All that is random in a suite follows from it
     #[arg(long, value_name = "N", default_value_t = 1, requires = "suite")]
@@ -45,6 +45,11 @@ pub struct Args {
     /// Threads to run on; the number changes no result
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
+}
+
+/// A number of walks: of none there are no figures.
+fn some_walks(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|&walks| walks > 0).ok_or_else(|| "expected a whole number from 1 on".to_owned())
 }
 
 /// Walks in buildings.
