@@ -6,6 +6,7 @@ pub mod cli;
 pub mod evaluation;
 pub mod export;
 pub mod follow;
+pub mod graph;
 pub mod gravity;
 pub mod link;
 pub mod particle;

@@ -106,6 +106,29 @@ pub fn bounds(points: impl IntoIterator<Item = Point>) -> Option<[Point; 2]> {
     })
 }
 
+/// A line with the points only at which it bends: what is left out lies within `off` of the rest. The ends stay.
+///
+/// # Source
+/// Douglas and Peucker (1973).
+pub fn simplified(points: &[Point], off: f64) -> Vec<Point> {
+    fn inner(points: &[Point], off: f64, found: &mut Vec<Point>) {
+        let &[first, .., last] = points else { return };
+        let far = points.iter().map(|&point| distance(nearest(&[first, last], point), point));
+        let farthest = far.enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+        if let Some((at, _)) = farthest.filter(|(_, far)| *far > off) {
+            inner(&points[..=at], off, found);
+            found.push(points[at]);
+            inner(&points[at..], off, found);
+        }
+    }
+    let mut found: Vec<Point> = points.first().copied().into_iter().collect();
+    inner(points, off, &mut found);
+    if points.len() > 1 {
+        found.extend(points.last());
+    }
+    found
+}
+
 /// The line along the middle of a long outline, a door for instance: from the middle of one short end to the other.
 pub fn middle_line(outline: &[Point]) -> Option<Segment> {
     let middle = centre(outline);

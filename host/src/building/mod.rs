@@ -18,7 +18,7 @@ pub mod geometry;
 pub mod georeference;
 pub mod hcu;
 pub mod imdf;
-mod index;
+pub(crate) mod index;
 pub mod merge;
 mod model;
 pub mod open;

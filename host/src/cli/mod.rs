@@ -21,6 +21,7 @@ pub mod parameters;
 mod phone;
 pub mod replay;
 pub mod report;
+pub mod route;
 pub mod simulate;
 mod suite;
 pub mod table;
@@ -52,6 +53,7 @@ enum Command {
     Demo(demo::Args),
     Replay(replay::Args),
     Building(building::Args),
+    Route(route::Args),
     Calibrate(calibrate::Args),
     Convert(convert::Args),
     Evaluate(evaluate::Args),
@@ -95,6 +97,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Demo(args) => demo::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Building(args) => building::run(args),
+        Command::Route(args) => route::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),

@@ -44,13 +44,36 @@ pub enum Kind {
     SelfCrossing,
     /// The same wall twice. A warning.
     DoubleWall,
+    /// An edge of the walk graph without a length. An error.
+    ZeroEdge,
+    /// An edge of the walk graph through a wall. An error.
+    EdgeThroughWall,
+    /// A part of the walk graph that is not joined to the rest. An error.
+    SeparatePiece,
+    /// Stairs, a ramp or an elevator of the walk graph that end nowhere, or are not in it. An error.
+    LeadsNowhere,
+    /// A room with a door that the walk graph does not lead into. An error.
+    RoomOffGraph,
+    /// An edge of the walk graph so short that a turn is looked for at the wrong node. A warning.
+    ShortEdge,
+    /// An edge of the walk graph so long that the heading drifts on it. A warning.
+    LongEdge,
+    /// Two edges of the walk graph that leave a node in nearly the same direction. A warning.
+    NarrowFork,
+    /// A crossing of the walk graph that does not have the way of those who cut its corner. A warning.
+    MissingDiagonal,
 }
 
 impl Kind {
     /// How bad it is.
     pub fn level(self) -> Level {
         match self {
-            Self::TinyGap | Self::DoubleWall => Level::Warning,
+            Self::TinyGap
+            | Self::DoubleWall
+            | Self::ShortEdge
+            | Self::LongEdge
+            | Self::NarrowFork
+            | Self::MissingDiagonal => Level::Warning,
             _ => Level::Error,
         }
     }
@@ -68,6 +91,15 @@ impl Kind {
             Self::MeetsNothing => "meets nothing",
             Self::SelfCrossing => "self-crossing",
             Self::DoubleWall => "double wall",
+            Self::ZeroEdge => "zero edge",
+            Self::EdgeThroughWall => "edge through wall",
+            Self::SeparatePiece => "separate piece",
+            Self::LeadsNowhere => "leads nowhere",
+            Self::RoomOffGraph => "room off graph",
+            Self::ShortEdge => "short edge",
+            Self::LongEdge => "long edge",
+            Self::NarrowFork => "narrow fork",
+            Self::MissingDiagonal => "missing diagonal",
         }
     }
 }
@@ -93,11 +125,15 @@ pub struct Finding {
 
 /// Looks at a building. The findings are sorted: errors first, then by kind, floor and place.
 pub fn check(building: &Building) -> Vec<Finding> {
-    let mut notes = Notes { building, findings: Vec::new() };
+    let mut notes = Notes::of(building);
     shape::check(building, &mut notes);
     walls::check(building, &mut notes);
     reach::check(building, &mut notes);
-    let mut findings = notes.findings;
+    sorted(notes.findings())
+}
+
+/// Errors first, then by kind, floor and place.
+pub fn sorted(mut findings: Vec<Finding>) -> Vec<Finding> {
     let place = |finding: &Finding| finding.place.unwrap_or_default();
     findings.sort_by(|a, b| {
         let key = |finding: &Finding| (finding.level, finding.kind, finding.floor);
@@ -111,19 +147,29 @@ pub fn check(building: &Building) -> Vec<Finding> {
 }
 
 /// Findings as they are noted.
-struct Notes<'a> {
+pub(crate) struct Notes<'a> {
     building: &'a Building,
     findings: Vec<Finding>,
 }
 
-impl Notes<'_> {
+impl<'a> Notes<'a> {
+    /// No findings yet.
+    pub(crate) fn of(building: &'a Building) -> Self {
+        Self { building, findings: Vec::new() }
+    }
+
+    /// All that were noted.
+    pub(crate) fn findings(self) -> Vec<Finding> {
+        self.findings
+    }
+
     /// Notes a finding at a place of a floor, in the room that is there.
-    fn at(&mut self, kind: Kind, floor: i32, place: Point, what: String, cure: &str) {
+    pub(crate) fn at(&mut self, kind: Kind, floor: i32, place: Point, what: String, cure: &str) {
         let room = self.building.floor(floor).and_then(|floor| floor.room_at(place)).map(|room| room.name.clone());
         self.note(kind, Some(floor), Some(place), room, what, cure);
     }
 
-    fn note(
+    pub(crate) fn note(
         &mut self,
         kind: Kind,
         floor: Option<i32>,

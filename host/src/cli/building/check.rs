@@ -2,14 +2,15 @@
 
 use super::{Input, folder, write_drawing};
 use crate::building::Building;
-use crate::building::check::{Finding, Kind, Level, check};
+use crate::building::check::{Finding, Kind, Level, check, sorted};
 use crate::building::picture::{self, Look, Mark};
 use crate::cli::{Error, print};
 use crate::export::file;
+use crate::graph::lint::{Parameters, lint};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Finds what breaks tracking: leaking walls, rooms and stairs without a way to them, swapped axes and more
 ///
@@ -38,11 +39,13 @@ const LISTED: usize = 20;
 /// Checks a building.
 pub fn run(args: &CheckArgs) -> Result<(), Error> {
     let building = args.input.read()?;
-    let found = check(&building);
-    let errors = found.iter().filter(|finding| finding.level == Level::Error).count();
-    let warnings = found.len() - errors;
+    let mut found = check(&building);
+    if building.graph.is_some() {
+        found.extend(lint(&building, &Parameters::default())?);
+        found = sorted(found);
+    }
+    let counts @ [errors, _] = counts(&found);
     let (listed, left_out) = if args.all { (found, BTreeMap::new()) } else { shortened(found) };
-    let counts = [errors, warnings];
     if args.json {
         print(&object(&building, &listed, &left_out, counts)?)?;
     } else {
@@ -59,18 +62,29 @@ pub fn run(args: &CheckArgs) -> Result<(), Error> {
             print(&format!("marked in {}\n", folder.display()))?;
         }
     }
+    refused(&args.input.input, errors)
+}
+
+/// How many errors and warnings there are.
+pub fn counts(found: &[Finding]) -> [usize; 2] {
+    let errors = found.iter().filter(|finding| finding.level == Level::Error).count();
+    [errors, found.len() - errors]
+}
+
+/// An error if there are any among the findings.
+pub fn refused(input: &Path, errors: usize) -> Result<(), Error> {
     match errors {
         0 => Ok(()),
-        1 => Err(Error::new(format!("{}: 1 error", args.input.input.display()))),
-        _ => Err(Error::new(format!("{}: {errors} errors", args.input.input.display()))),
+        1 => Err(Error::new(format!("{}: 1 error", input.display()))),
+        _ => Err(Error::new(format!("{}: {errors} errors", input.display()))),
     }
 }
 
 /// How many of a kind and floor are not listed.
-type LeftOut = BTreeMap<(Kind, Option<i32>), usize>;
+pub type LeftOut = BTreeMap<(Kind, Option<i32>), usize>;
 
 /// The first of each kind and floor, and how many more there are.
-fn shortened(found: Vec<Finding>) -> (Vec<Finding>, LeftOut) {
+pub fn shortened(found: Vec<Finding>) -> (Vec<Finding>, LeftOut) {
     let mut counts: LeftOut = BTreeMap::new();
     let mut listed = Vec::new();
     for finding in found {
@@ -85,7 +99,7 @@ fn shortened(found: Vec<Finding>) -> (Vec<Finding>, LeftOut) {
 }
 
 /// Findings with their numbers, as in the picture.
-fn text(building: &Building, listed: &[Finding], left_out: &LeftOut, [errors, warnings]: [usize; 2]) -> String {
+pub fn text(building: &Building, listed: &[Finding], left_out: &LeftOut, [errors, warnings]: [usize; 2]) -> String {
     let mut text = String::new();
     for (index, finding) in listed.iter().enumerate() {
         let level = match finding.level {
@@ -144,7 +158,7 @@ fn object(
 }
 
 /// The findings of a floor, with the numbers they have in the list.
-fn marks(listed: &[Finding], floor: i32) -> Vec<Mark> {
+pub fn marks(listed: &[Finding], floor: i32) -> Vec<Mark> {
     let numbered = (1..).zip(listed).filter(|(_, finding)| finding.floor == Some(floor));
     let mark = |(number, finding): (usize, &Finding)| {
         let look = match finding.level {

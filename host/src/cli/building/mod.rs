@@ -1,6 +1,7 @@
-//! `sohle building`: buildings are generated, converted, shown and checked.
+//! `sohle building`: buildings are generated, converted, shown and checked, and their walk graphs drawn.
 
 mod check;
+mod graph;
 
 use super::table::Table;
 use super::{Error, print};
@@ -27,6 +28,7 @@ enum Command {
     Convert(ConvertArgs),
     Show(ShowArgs),
     Check(check::CheckArgs),
+    Graph(graph::GraphArgs),
 }
 
 /// Which building is made.
@@ -60,7 +62,7 @@ struct GenerateArgs {
 
 /// How a building is read.
 #[derive(Debug, clap::Args)]
-struct Input {
+pub struct Input {
     /// The file or folder
     #[arg(value_name = "IN")]
     input: PathBuf,
@@ -76,7 +78,8 @@ struct Input {
 }
 
 impl Input {
-    fn read(&self) -> Result<Building, Error> {
+    /// Reads it.
+    pub fn read(&self) -> Result<Building, Error> {
         if !(1.0..=100.0).contains(&self.storey) {
             return Err(Error::new(format!("--storey {}: expected 1 to 100 metres", self.storey)));
         }
@@ -127,6 +130,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         Command::Convert(args) => convert(&args),
         Command::Show(args) => show(&args),
         Command::Check(args) => check::run(&args),
+        Command::Graph(args) => graph::run(&args),
     }
 }
 
