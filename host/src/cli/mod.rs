@@ -14,6 +14,7 @@ pub mod demo;
 pub mod endurance;
 mod error;
 pub mod evaluate;
+pub mod graph;
 pub mod line;
 pub mod live;
 mod located;
@@ -54,6 +55,7 @@ enum Command {
     Replay(replay::Args),
     Building(building::Args),
     Route(route::Args),
+    Graph(graph::Args),
     Calibrate(calibrate::Args),
     Convert(convert::Args),
     Evaluate(evaluate::Args),
@@ -98,6 +100,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Replay(args) => replay::run(args),
         Command::Building(args) => building::run(args),
         Command::Route(args) => route::run(args),
+        Command::Graph(args) => graph::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Evaluate(args) => evaluate::run(args),

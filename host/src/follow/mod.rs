@@ -10,7 +10,7 @@ mod json;
 mod modes;
 mod reach;
 pub mod scene;
-mod start;
+pub mod start;
 
 pub use error::Error;
 pub use follower::{Followed, Follower, LONGEST_STEP_M, Said, Settings, Unusual};

@@ -1,7 +1,7 @@
 //! The walk graph: the building as a net of places and ways, for routes and for trackers that walk on it.
 //!
 //! [`Graph`] is the storage: nodes, and two directed edges for each way that is drawn, in an indexed adjacency list. [`paths`]
-//! finds shortest ways, [`route`] tells them in words. [`adjacency`] is the table in
+//! finds shortest ways, [`route`] tells them in words, [`tracker`] follows somebody on them. [`adjacency`] is the table in
 //! which graphs are exchanged, [`draw`](mod@draw) makes a graph from walls, doors and stairs, [`lint`](mod@lint) finds what a
 //! tracker would stumble over.
 //!
@@ -15,6 +15,7 @@ pub mod lint;
 mod model;
 pub mod paths;
 pub mod route;
+pub mod tracker;
 
 pub use error::Error;
 pub use model::{Edge, EdgeId, EdgeKind, Graph, NodeId};
