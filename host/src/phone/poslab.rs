@@ -7,7 +7,8 @@ use sohle_shared::time::Micros;
 use std::path::Path;
 
 /// Reads the walk `name` of a folder: `name_accel.csv`, `name_gyro.csv` and, where they are, `name_magnet.csv`,
-/// `name_baro.csv` and `name_waypoints.csv`.
+/// `name_baro.csv`, `name_waypoints.csv` and `name_trajectory.csv`: positions as 5G would tell them. What the last says of
+/// their error means nothing and is not read.
 ///
 /// # Errors
 /// When a file cannot be read, when a line is none, or when it has no samples.
@@ -16,7 +17,11 @@ pub fn read(folder: &Path, name: &str) -> Result<PhoneRecording, ReadError> {
     let table = |kind: &str, columns: usize| rows(&text_of(&path(kind))?, &path(kind).display().to_string(), columns);
     let optional = |kind: &str, columns: usize| if path(kind).exists() { table(kind, columns) } else { Ok(Vec::new()) };
     let (accel, gyro) = (table("accel", 3)?, table("gyro", 3)?);
-    let (magnet, pressure, places) = (optional("magnet", 3)?, optional("baro", 1)?, optional("waypoints", 2)?);
+    let (magnet, pressure) = (optional("magnet", 3)?, optional("baro", 1)?);
+    let places = |kind: &str| -> Result<Vec<WayPoint>, ReadError> {
+        let place = |(time, row): &(Micros, Vec<f64>)| WayPoint { time: *time, place: [row[0], row[1]] };
+        Ok(optional(kind, 2)?.iter().map(place).collect())
+    };
     let vector = |row: &(Micros, Vec<f64>)| Vector3::new(row.1[0], row.1[1], row.1[2]);
     let mut rates = Latest::new(&gyro);
     let mut fields = Latest::new(&magnet);
@@ -38,8 +43,7 @@ pub fn read(folder: &Path, name: &str) -> Result<PhoneRecording, ReadError> {
         let file = path("accel").display().to_string();
         return Err(ReadError::Empty { file, what: "accelerometer and gyroscope" });
     }
-    let way_points = places.iter().map(|(time, row)| WayPoint { time: *time, place: [row[0], row[1]] }).collect();
-    Ok(PhoneRecording { samples, way_points })
+    Ok(PhoneRecording { samples, way_points: places("waypoints")?, positions: places("trajectory")? })
 }
 
 /// The last row that is not later than a moment; moments have to come in order.
@@ -91,12 +95,14 @@ mod tests {
         write("accel", "timestamp x y z\n1.0e+3 1 2 3\n1.01e+3 4 5 6\n");
         write("gyro", "timestamp x y z\n1000 0.1 0.2 0.3\n");
         write("baro", "timestamp bar\n1005 1013\n");
+        write("trajectory", "timestamp x y error\n1500.0 566575.8 5932828.5 5.5\n");
         write("waypoints", "timestamps x y height\n1000 566578.7 5932830.4 19.6\n");
         let recording = read(folder.path(), "a").unwrap();
         assert_eq!(recording.samples.len(), 2);
         assert_eq!(recording.samples.iter().map(|sample| sample.pressure).collect::<Vec<_>>(), [None, Some(1_013.0)]);
         assert_eq!(recording.samples[1].gyro, Vector3::new(0.1, 0.2, 0.3));
         assert_eq!(recording.way_points, [WayPoint { time: Micros(1_000_000), place: [566_578.7, 5_932_830.4] }]);
+        assert_eq!(recording.positions, [WayPoint { time: Micros(1_500_000), place: [566_575.8, 5_932_828.5] }]);
         write("gyro", "timestamp x y z\n1000 0.1 0.2\n");
         assert!(read(folder.path(), "a").unwrap_err().to_string().ends_with("a_gyro.csv, line 2: needs 4 columns"));
         assert!(read(folder.path(), "b").unwrap_err().to_string().ends_with("b_accel.csv cannot be read"));

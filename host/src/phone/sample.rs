@@ -18,7 +18,7 @@ pub struct PhoneSample {
     pub pressure: Option<f64>,
 }
 
-/// Where the person was at a moment, surveyed.
+/// Where the person was at a moment, as it was surveyed or as a source of positions says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WayPoint {
     /// When.
@@ -32,8 +32,10 @@ pub struct WayPoint {
 pub struct PhoneRecording {
     /// In order of time.
     pub samples: Vec<PhoneSample>,
-    /// In order of time.
+    /// Surveyed, in order of time.
     pub way_points: Vec<WayPoint>,
+    /// What a source of positions said, in order of time; most recordings have none.
+    pub positions: Vec<WayPoint>,
 }
 
 /// Why a recording cannot be read.

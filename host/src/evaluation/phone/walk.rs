@@ -70,6 +70,8 @@ pub struct PhoneWalk {
     pub samples: Vec<PhoneSample>,
     /// **Frame:** building.
     pub way_points: Vec<WayPoint>,
+    /// What a source of positions said. **Frame:** building.
+    pub positions: Vec<WayPoint>,
     /// The plan of the floor.
     pub building: Building,
     /// The same for the particle filter.
@@ -101,6 +103,7 @@ impl PhoneWalk {
         Ok(Self {
             name: source.name,
             way_points: recording.way_points.iter().map(moved).collect(),
+            positions: recording.positions.iter().map(moved).collect(),
             samples: recording.samples,
             map: Arc::new(Map::of(&building)?),
             building,
@@ -117,6 +120,15 @@ impl PhoneWalk {
 pub fn all() -> Result<Vec<PhoneWalk>, Error> {
     let home = recordings_dir().ok_or(Error::NoRecordings)?;
     SOURCES.iter().map(|source| PhoneWalk::read(&home, source)).collect()
+}
+
+/// The walk along an eight in the university, the only one with positions of another source.
+///
+/// # Errors
+/// As [`all`].
+pub fn eight() -> Result<PhoneWalk, Error> {
+    let home = recordings_dir().ok_or(Error::NoRecordings)?;
+    PhoneWalk::read(&home, &SOURCES[0])
 }
 
 #[cfg(test)]
