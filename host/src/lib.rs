@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod cli;
 pub mod evaluation;
 pub mod export;
+pub mod fixes;
 pub mod follow;
 pub mod graph;
 pub mod gravity;

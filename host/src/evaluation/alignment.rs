@@ -40,6 +40,11 @@ impl Rigid {
         Self { cos, sin, offset }
     }
 
+    /// The turn, counter-clockwise. **Units:** rad, in (-pi, pi].
+    pub fn angle(&self) -> f64 {
+        libm::atan2(self.sin, self.cos)
+    }
+
     /// Where `point` comes to lie. **Units:** m.
     pub fn apply(&self, point: [f64; 2]) -> [f64; 2] {
         [
