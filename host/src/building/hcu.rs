@@ -93,9 +93,9 @@ fn floor(file: &FloorFile<'_>, features: &[RawFeature]) -> Result<Floor, Error> 
             }
         }
     }
-    floor.walls = opening::cut(&floor.walls, &doors)?;
     let rooms: Vec<Outline> = floor.rooms.iter().map(|room| room.outline.clone()).collect();
     floor.walls.extend(open_edges(&rooms, solids));
+    floor.walls = opening::cut(&floor.walls, &doors)?;
     Ok(floor)
 }
 
