@@ -39,6 +39,8 @@ const FASTEST_M_S: f32 = 1.8;
 const LONGEST_STEP_M: f32 = 2.0;
 /// Somebody who is lost is looked for this far around at first. **Units:** m.
 const LOST_RADIUS_M: f32 = 15.0;
+/// Whoever may have gone this far unseen may as well be on another floor. **Units:** m.
+const ANYWHERE_M: f32 = 60.0;
 /// Part of the weight that stays with what was believed when it counts as lost, and of the rest the part that goes to the
 /// surroundings; what is left goes to everywhere.
 const BELIEVED_PART: f32 = 0.1;
@@ -222,11 +224,15 @@ impl ParticleFilter {
         moved
     }
 
-    /// Sows new particles around the likeliest of `leaders` and, thinly, everywhere, in place of all there were.
+    /// Sows new particles around the likeliest of `leaders` and, thinly, everywhere, in place of all there were; only
+    /// everywhere, if the radius is so large that the place of the leaders says nothing.
     fn sow_around(&mut self, leaders: &[Cluster], radius: f32) {
         let mut stream = Stream::new(self.seed, Purpose::Recover, self.number, 0);
         let mut parameters = self.parameters.clone();
-        parameters.most /= 2;
+        let leaders = if radius < ANYWHERE_M { leaders } else { &[] };
+        if !leaders.is_empty() {
+            parameters.most /= 2;
+        }
         let mut around = Vec::new();
         for leader in leaders.iter().take(3).filter(|leader| leader.probability > 0.1) {
             let patch = Patch {
