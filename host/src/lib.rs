@@ -17,3 +17,5 @@ pub mod serve;
 pub mod simulation;
 pub mod toml_file;
 pub mod track;
+#[cfg(feature = "window")]
+pub mod window;
