@@ -1,7 +1,7 @@
 //! Attitude, position and velocity of the foot as one point of a manifold, and how a sample moves it on.
 
 use crate::so3;
-use nalgebra::{SVector, UnitQuaternion, Vector3};
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 
 /// Degrees of freedom of a [`State`]; errors are ordered rotation, position, velocity.
 pub const FREEDOMS: usize = 9;
@@ -24,6 +24,11 @@ pub struct State {
     pub position: Vector3<f32>,
     /// **Units:** m/s; **Frame:** world, z up.
     pub velocity: Vector3<f32>,
+}
+
+/// Standard deviation of the vector that begins at component `first` of an error: root of the sum of its three variances.
+pub fn sigma<const N: usize>(covariance: &SMatrix<f32, N, N>, first: usize) -> f32 {
+    libm::sqrtf((first..first + 3).map(|axis| covariance[(axis, axis)].max(0.0)).sum())
 }
 
 impl State {

@@ -192,6 +192,17 @@ impl Adaptive {
         Verdict { stance: self.standing, statistic, velocity_sigma }
     }
 
+    /// The statistic of the last moment that was judged. **Units:** 1.
+    pub fn latest(&self) -> Option<f32> {
+        self.last.map(|(_, statistic)| statistic)
+    }
+
+    /// The statistic below which the foot stands now, if it does not move too fast. **Units:** 1.
+    pub fn bound(&self) -> f32 {
+        let p = self.parameters;
+        if self.standing { p.leave * self.stillest() } else { (p.enter * self.stillest()).min(p.limit) }
+    }
+
     /// When the stance that is on began.
     pub fn standing_since(&self) -> Option<Micros> {
         self.calm_since.filter(|_| self.standing)

@@ -190,6 +190,19 @@ pub struct Counters {
     pub restarts: u32,
 }
 
+/// What goes on inside, for those who watch. What the chosen method does not know is not a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Insight {
+    /// How restless the foot is, as the detector of stances measures it. **Units:** 1.
+    pub statistic: f32,
+    /// Below it the foot stands. **Units:** 1.
+    pub bound: f32,
+    /// Standard deviation of [`Tracker::displacement`], root of the sum over the axes. **Units:** m.
+    pub displacement_sigma: f32,
+    /// Standard deviation of [`Tracker::velocity`], the same. **Units:** m/s.
+    pub velocity_sigma: f32,
+}
+
 /// From samples to steps.
 #[derive(Clone, Debug)]
 pub struct Tracker {
@@ -312,6 +325,11 @@ impl Tracker {
     /// the next step will be.
     pub fn displacement(&self) -> Vector3<f32> {
         self.foot().position
+    }
+
+    /// What goes on inside.
+    pub fn insight(&self) -> Insight {
+        self.way.insight()
     }
 
     /// Attitude of the sensor now. **Frame:** from the sensor to that of [`Tracker::displacement`].

@@ -5,9 +5,9 @@
 
 use super::ground::{Finding, Ground, Sight};
 use super::stride::{Event, StepBuilder};
-use super::{Counters, Output, Parameters, State};
+use super::{Counters, Insight, Output, Parameters, State};
 use crate::filter::pivot::PivotFilter;
-use crate::filter::state::POSITION;
+use crate::filter::state::{POSITION, VELOCITY, sigma};
 use crate::preintegration::{Increment, Preintegrator};
 use crate::rest::RestDetector;
 use crate::sample::{AccelBias, GyroBias, ImuSample, STANDARD_GRAVITY_M_S2};
@@ -307,6 +307,16 @@ impl Own {
 
     pub(super) fn phase(&self) -> State {
         self.state
+    }
+
+    pub(super) fn insight(&self) -> Insight {
+        let covariance = self.filter.covariance();
+        Insight {
+            statistic: self.detector.latest().unwrap_or(f32::NAN),
+            bound: self.detector.bound(),
+            displacement_sigma: sigma(covariance, POSITION),
+            velocity_sigma: sigma(covariance, VELOCITY),
+        }
     }
 
     pub(super) fn foot(&self) -> &crate::filter::state::State {

@@ -2,7 +2,7 @@
 
 use super::documented::Documented;
 use super::own::Own;
-use super::{Counters, Method, Output, Parameters, State};
+use super::{Counters, Insight, Method, Output, Parameters, State};
 use crate::filter;
 use crate::sample::ImuSample;
 use crate::step::{FloorMode, Step};
@@ -87,6 +87,13 @@ impl Way {
         match self {
             Self::Own(own) => own.phase(),
             Self::Documented(documented) => documented.phase(),
+        }
+    }
+
+    pub(super) fn insight(&self) -> Insight {
+        match self {
+            Self::Own(own) => own.insight(),
+            Self::Documented(documented) => documented.insight(),
         }
     }
 

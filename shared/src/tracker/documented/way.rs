@@ -1,7 +1,7 @@
 //! The way itself.
 
 use super::Parameters;
-use crate::filter::state::{self, POSITION};
+use crate::filter::state::{self, POSITION, VELOCITY};
 use crate::filter::unscented::UnscentedFilter;
 use crate::sample::{AccelCorrected, ClippedSamples, GyroCorrected, ImuSample, STANDARD_GRAVITY_M_S2};
 use crate::so3;
@@ -10,7 +10,7 @@ use crate::step::{FloorMode, Step};
 use crate::time::Micros;
 use crate::tracker::ground::{Ground, Sight};
 use crate::tracker::stride::{Event, StepBuilder};
-use crate::tracker::{self, Counters, Detector, Output, State};
+use crate::tracker::{self, Counters, Detector, Insight, Output, State};
 use nalgebra::Vector3;
 
 #[derive(Clone, Debug)]
@@ -129,6 +129,17 @@ impl Documented {
 
     pub(in crate::tracker) fn phase(&self) -> State {
         self.phase
+    }
+
+    /// The detectors that can be chosen have nothing in common that could be watched.
+    pub(in crate::tracker) fn insight(&self) -> Insight {
+        let covariance = self.filter.covariance();
+        Insight {
+            statistic: f32::NAN,
+            bound: f32::NAN,
+            displacement_sigma: state::sigma(covariance, POSITION),
+            velocity_sigma: state::sigma(covariance, VELOCITY),
+        }
     }
 
     pub(in crate::tracker) fn foot(&self) -> &state::State {
