@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use sohle_shared::sample::ImuSample;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
-use sohle_shared::tracker::{Counters, Order, Parameters, Tracker};
+use sohle_shared::tracker::{Counters, Order, Output, Parameters, Tracker};
 
 /// A stance and where it was.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,15 +98,9 @@ impl Track {
                 tracker.obey(order);
             }
             let output = tracker.push(&sample);
-            track.span = Some((track.span.map_or(sample.time, |(first, _)| first), sample.time));
-            if let Some(step) = output.step {
-                track.add(step);
-                if let Some(order) = steer.after(&step) {
-                    tracker.obey(order);
-                }
-            }
-            if let Some(stance) = track.stances.last_mut().filter(|_| output.reported) {
-                stance.end = sample.time;
+            track.take(sample.time, &output);
+            if let Some(order) = output.step.and_then(|step| steer.after(&step)) {
+                tracker.obey(order);
             }
             if due.is_none_or(|due| sample.time >= due) {
                 track.path.push(PathPoint { time: sample.time, position: track.ahead(tracker.displacement()) });
@@ -119,6 +113,17 @@ impl Track {
         }
         track.counters = *tracker.counters();
         track
+    }
+
+    /// Takes in what the sample of a time led to. Does not add to [`Track::path`].
+    pub fn take(&mut self, time: Micros, output: &Output) {
+        self.span = Some((self.span.map_or(time, |(first, _)| first), time));
+        if let Some(step) = output.step {
+            self.add(step);
+        }
+        if let Some(stance) = self.stances.last_mut().filter(|_| output.reported) {
+            stance.end = time;
+        }
     }
 
     /// Appends a step to the end of the track.
@@ -134,7 +139,7 @@ impl Track {
     }
 
     /// The place that lies at `displacement` in the heading frame of the last stance. **Units:** m.
-    fn ahead(&self, displacement: Vector3<f32>) -> [f64; 3] {
+    pub fn ahead(&self, displacement: Vector3<f32>) -> [f64; 3] {
         let last = self.stances.last();
         let origin = last.map_or([0.0; 3], |stance| stance.position);
         let (sin, cos) = libm::sincos(last.map_or(0.0, |stance| stance.heading));

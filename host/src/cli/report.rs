@@ -11,6 +11,7 @@ use crate::evaluation::{Metric, Metrics};
 use crate::export::geojson::Origin;
 use crate::export::picture::{Dot, Line, Picture, Placement, Role};
 use crate::export::{self, Named, file};
+use crate::follow::Orders;
 use crate::recording::live::BEGAN;
 use crate::recording::{Recording, SimulatedTruth, mcap};
 use crate::track::{Steer, Track};
@@ -143,8 +144,7 @@ fn outcome(
     let begun = Instant::now();
     let correct = |sample: &ImuSample| calibration.map_or(*sample, |calibration| calibration.apply(sample, None));
     let began_us = recording.metadata.get(BEGAN).and_then(|text| text.parse().ok());
-    let (orders, wanted) = (&recording.orders[..], recording.orders.is_empty());
-    let mut steering = Steering { orders, following, mode: None, wanted, began_us };
+    let mut steering = Steering { recorded: &recording.orders, orders: Orders::default(), following, began_us };
     let track = if recording.samples.is_empty() {
         recording.steps.iter().for_each(|step| _ = steering.after(step));
         Track::of_steps(&recording.steps)
@@ -158,29 +158,23 @@ fn outcome(
     Outcome { settings, track, taken, metrics, placement }
 }
 
-/// What the tracker of a recording is told: what the shoe was told when it was recorded, else what a building asks for.
+/// Gives the tracker of a recording its orders.
 struct Steering<'a> {
-    orders: &'a [(usize, Order)],
+    recorded: &'a [(usize, Order)],
+    orders: Orders,
     following: Option<&'a mut Following>,
-    mode: Option<FloorMode>,
-    /// What the building asks for is done.
-    wanted: bool,
     /// When the time of the recording was zero, if it knows its date. **Units:** microseconds since the beginning of 1970.
     began_us: Option<i64>,
 }
 
 impl Steer for Steering<'_> {
     fn before(&mut self, sample: usize) -> Vec<Order> {
-        let count = self.orders.iter().take_while(|(at, _)| *at <= sample).count();
-        let (due, later) = self.orders.split_at(count);
-        self.orders = later;
-        due.iter().map(|(_, order)| *order).collect()
+        self.orders.before(self.recorded, sample).collect()
     }
 
     fn after(&mut self, step: &Step) -> Option<Order> {
         let mode = self.following.as_mut()?.step(step, self.began_us.map(|began| began + step.stance_end.0)).0.mode;
-        let changed = mode != std::mem::replace(&mut self.mode, mode);
-        (changed && self.wanted).then_some(Order::FloorMode(mode))
+        self.orders.after(self.recorded, mode)
     }
 }
 

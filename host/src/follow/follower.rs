@@ -85,6 +85,7 @@ pub struct Place {
 #[derive(Clone, Debug)]
 pub struct Follower {
     building: Arc<Building>,
+    settings: Settings,
     filter: ParticleFilter,
     reach: Reach,
     modes: FloorModes,
@@ -98,10 +99,7 @@ impl Follower {
     /// A start that means nothing in the building or lies outside, an unknown start where no wall could ever tell anything,
     /// and settings out of bounds.
     pub fn new(building: Building, settings: &Settings) -> Result<Self, Error> {
-        let start = parse_start(&building, &settings.start)?;
-        if start == Start::Anywhere && building.floors.iter().all(|floor| floor.walls.is_empty()) {
-            return Err(Error::NoWalls(building.name));
-        }
+        let start = begin(&building, &settings.start)?;
         let map = Arc::new(Map::of(&building)?);
         Ok(Self {
             filter: ParticleFilter::new(map, &settings.particle, &start, settings.seed)?,
@@ -109,7 +107,30 @@ impl Follower {
             modes: FloorModes::new(settings.steering),
             path: Vec::new(),
             building: Arc::new(building),
+            settings: settings.clone(),
         })
+    }
+
+    /// Another, who begins to follow at `start` in the same building.
+    ///
+    /// # Errors
+    /// As [`Follower::new`].
+    pub fn anew(&self, start: &str) -> Result<Self, Error> {
+        let place = begin(&self.building, start)?;
+        let settings = Settings { start: start.to_owned(), ..self.settings.clone() };
+        Ok(Self {
+            filter: ParticleFilter::new(self.filter.map().clone(), &settings.particle, &place, settings.seed)?,
+            modes: FloorModes::new(settings.steering),
+            path: Vec::new(),
+            building: self.building.clone(),
+            reach: self.reach.clone(),
+            settings,
+        })
+    }
+
+    /// How it follows.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
     }
 
     /// Takes in a step. Whatever it is, an answer follows.
@@ -203,6 +224,15 @@ impl Follower {
     }
 }
 
+/// Where the walk begins, if it can be followed from there.
+fn begin(building: &Building, start: &str) -> Result<Start, Error> {
+    let start = parse_start(building, start)?;
+    if start == Start::Anywhere && building.floors.iter().all(|floor| floor.walls.is_empty()) {
+        return Err(Error::NoWalls(building.name.clone()));
+    }
+    Ok(start)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -262,6 +292,18 @@ mod tests {
         step.turn = f32::NAN;
         let said = follower.step(&step);
         assert_eq!((said.unusual, said.estimate), (Some(Unusual::NoNumber), before));
+    }
+
+    #[test]
+    fn who_begins_anew_is_as_new() {
+        let walk = walk(&["W02", "hall"]);
+        let mut follower = from("anywhere");
+        walk.steps.iter().take(3).for_each(|step| _ = follower.step(step));
+        let (mut again, mut new) = (follower.anew("W02").unwrap(), from("W02"));
+        for step in &walk.steps {
+            assert_eq!(again.step(step), new.step(step));
+        }
+        assert!(follower.anew("nowhere").is_err());
     }
 
     #[test]

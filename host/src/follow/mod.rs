@@ -8,7 +8,9 @@ mod error;
 mod follower;
 mod json;
 mod modes;
+mod orders;
 mod reach;
+mod runs;
 pub mod scene;
 pub mod start;
 
@@ -16,4 +18,6 @@ pub use error::Error;
 pub use follower::{Followed, Follower, LONGEST_STEP_M, Said, Settings, Unusual};
 pub use json::{line, mode_word};
 pub use modes::{FloorModes, Shares, Steering};
+pub use orders::Orders;
+pub use runs::runs;
 pub use start::parse as parse_start;

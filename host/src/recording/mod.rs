@@ -101,7 +101,16 @@ pub fn recordings_dir() -> Option<PathBuf> {
     [project.join("recordings"), project.join("../shared/recordings")].into_iter().find(|path| path.is_dir())
 }
 
+/// Metadata that names the building whose frame the truth of a recording is in.
+const BUILDING: &str = "building";
+
 impl Recording {
+    /// The truth, if it is that of a walk in the building of this name.
+    pub fn truth_in(&self, building: &str) -> Option<&SimulatedTruth> {
+        let there = self.metadata.get(BUILDING).is_some_and(|name| name == building);
+        self.truth.as_ref().filter(|truth| there && !truth.poses.is_empty())
+    }
+
     /// Usual number of samples in a second. **Units:** Hz; 0 with fewer than two moments.
     pub fn rate_hz(&self) -> f64 {
         table::usual_period(&self.samples).map_or(0.0, |period| 1.0 / period)

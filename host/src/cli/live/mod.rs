@@ -1,21 +1,21 @@
 //! `sohle live`: a shoe's steps as they come, and everything it says in a recording.
 
+mod listening;
 mod places;
 mod show;
 mod words;
+
+pub use listening::Listening;
+pub use places::{Places, Told};
+pub use show::Show;
 
 use super::located::InBuilding;
 use super::{Error, parameters};
 use crate::calibration;
 use crate::link::recorder::Recorder;
 use crate::link::{Address, Connection};
-use crate::recording::live::{CALIBRATION, PARAMETERS};
 use clap::ValueEnum;
-use places::Places;
-use show::Show;
-use sohle_shared::tracker::Order;
-use sohle_shared::wire::message::Action;
-use sohle_shared::wire::transfer::{Item, Value};
+use sohle_shared::wire::transfer::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -102,46 +102,24 @@ pub fn run(args: Args) -> Result<(), Error> {
     let places = Places::prepare(&args.place)?;
     let recorder = if args.no_record { None } else { Some(begin(args.out.as_deref())?) };
     let opened = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    let mut connection = Connection::open(args.address.clone());
+    let connection = Connection::open(args.address.clone());
     let opened_us = i64::try_from(opened.as_micros()).unwrap_or_default();
-    let mut show = Show::new(&args, recorder, places, opened_us);
+    let show = Show::new(&args, recorder, places, opened_us);
     show.head()?;
-    let mut prepared = None;
+    let mut listening = Listening::new(connection, show, values, args.raw);
     let result = loop {
-        let enough = args.steps.is_some_and(|steps| show.steps >= steps);
+        let enough = args.steps.is_some_and(|steps| listening.show().steps >= steps);
         if enough || stop.load(Ordering::Relaxed) || until.is_some_and(|until| Instant::now() >= until) {
             break Ok(());
         }
-        if let Some(fault) = show.fault.take() {
-            break Err(Error::new(fault));
-        }
-        if show.boot.is_some() && show.boot != prepared {
-            prepared = show.boot;
-            if let Err(error) = prepare(&mut connection, &mut show, &values, args.raw) {
-                break Err(error);
-            }
-            // What an earlier program told it, or the reset took away.
-            show.shoe_forgot();
-        }
-        if show.boot.is_some()
-            && let Some(mode) = show.mode_due()
-        {
-            let number = connection.tell(Action::Order(Order::FloorMode(mode)));
-            show.mode_sent(number, mode);
-        }
-        if let Some(happening) = connection.next(LOOK) {
-            show.take(happening, &connection);
+        if let Err(error) = listening.turn(LOOK, |_, _| {}) {
+            break Err(error);
         }
     };
-    if show.places.as_ref().is_some_and(Places::holds_a_mode) && result.is_ok() {
-        // Who is not followed any more decides alone; a shoe that does not hear it is freed by the next program.
-        let free = Action::Order(Order::FloorMode(None));
-        let _ = connection.ask(free, &mut |happening, connection| show.take(happening, connection));
+    if result.is_ok() {
+        listening.take_leave();
     }
-    if args.raw && show.boot.is_some() && result.is_ok() {
-        // If the shoe does not hear it, the next program that says hello ends it.
-        let _ = connection.ask(Action::Raw(false), &mut |happening, connection| show.take(happening, connection));
-    }
+    let (connection, show) = listening.into_parts();
     show.finish(&connection)?;
     result
 }
@@ -160,26 +138,4 @@ fn begin(path: Option<&Path>) -> Result<Recorder, Error> {
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Ok(Recorder::begin(&path, &name)?)
-}
-
-/// Gives a shoe that has just started what it is to have, and turns raw counts on.
-fn prepare(connection: &mut Connection, show: &mut Show, values: &[Value], raw: bool) -> Result<(), Error> {
-    for value in values {
-        connection.write(value, &mut |happening, connection| show.take(happening, connection))?;
-    }
-    if !raw {
-        return Ok(());
-    }
-    for item in [Item::Parameters, Item::Calibration] {
-        let value = connection.read(item, &mut |happening, connection| show.take(happening, connection))?;
-        let (key, text) = match value {
-            Value::Parameters(parameters) => (PARAMETERS, toml::to_string(&parameters)?),
-            Value::Calibration(calibration) => (CALIBRATION, toml::to_string(&calibration)?),
-        };
-        if let Some(recorder) = &mut show.recorder {
-            recorder.about(key, text);
-        }
-    }
-    connection.ask(Action::Raw(true), &mut |happening, connection| show.take(happening, connection))?;
-    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::cli::located::{Following, InBuilding};
 use crate::cli::{Error, live::words};
-use crate::follow::{mode_word, scene};
+use crate::follow::{self, Follower, mode_word, scene};
 use crate::link::Connection;
 use crate::link::ground::ShoeMode;
 use crate::particle::Parameters;
@@ -34,8 +34,11 @@ pub struct Places {
 
 /// What is said after a step: for people and for programs.
 pub struct Told {
+    /// For people.
     pub text: String,
+    /// For programs.
     pub object: Json,
+    /// For viewers.
     pub moment: Moment,
 }
 
@@ -43,14 +46,27 @@ impl Places {
     /// Reads the building and the start, if a building is asked for.
     pub fn prepare(place: &InBuilding) -> Result<Option<Self>, Error> {
         let following = place.prepare(Parameters::default())?;
-        Ok(following.map(|following| Self {
-            following,
-            shoe: ShoeMode::default(),
-            starts_here: place.how.starts_somewhere(),
-            waiting: Vec::new(),
-            before: 0,
-            unusual: 0,
-        }))
+        Ok(following.map(|following| Self::new(following, place.how.starts_somewhere())))
+    }
+
+    /// Of somebody who has not gone yet. `starts_here`: whether the walk begins somewhere, now.
+    pub fn new(following: Following, starts_here: bool) -> Self {
+        Self { following, shoe: ShoeMode::default(), starts_here, waiting: Vec::new(), before: 0, unusual: 0 }
+    }
+
+    /// Who follows.
+    pub fn follower(&self) -> &Follower {
+        self.following.follower()
+    }
+
+    /// The walk begins at `start`, now.
+    ///
+    /// # Errors
+    /// As [`Follower::anew`].
+    pub fn begin_anew(&mut self, start: &str) -> Result<(), follow::Error> {
+        self.following.begin_anew(start)?;
+        self.waiting.clear();
+        Ok(())
     }
 
     /// Takes a step in, and tells of all whose time is known by now.

@@ -19,6 +19,7 @@ use std::path::PathBuf;
 /// What is shown, and what has been so far.
 #[derive(Default)]
 pub struct Show {
+    /// Where it is written, while it is.
     pub recorder: Option<Recorder>,
     format: Format,
     quiet: bool,
@@ -26,6 +27,7 @@ pub struct Show {
     pub boot: Option<u32>,
     /// Boot and number of the last step.
     last: Option<(u32, u32)>,
+    /// Steps so far.
     pub steps: u64,
     lost: u64,
     doubled: u64,
@@ -37,6 +39,7 @@ pub struct Show {
     raw_next: u32,
     status: Option<Status>,
     load_max: u16,
+    /// Why it cannot go on.
     pub fault: Option<String>,
     /// The walk in a building.
     pub places: Option<Places>,
@@ -64,6 +67,26 @@ impl Show {
             pictures: args.pictures.clone(),
             ..Self::default()
         }
+    }
+
+    /// Says nothing, and records nothing yet. `opened_us` is when the connection was begun, in microseconds since the
+    /// beginning of 1970.
+    pub fn silent(places: Option<Places>, opened_us: i64) -> Self {
+        Self { places, opened_us, quiet: true, ..Self::default() }
+    }
+
+    /// Begins to record, in the midst of what is said: `heard` is what the recording begins with.
+    pub fn record(&mut self, mut recorder: Recorder, heard: Option<Heard>) {
+        if let Some(heard) = heard {
+            recorder.heard(heard);
+        }
+        (self.dated, self.plan_recorded) = (None, false);
+        self.recorder = Some(recorder);
+    }
+
+    /// Ends the recording. What there is to tell, if one was going on.
+    pub fn recorded(&mut self) -> Option<String> {
+        self.recorder.take().map(|recorder| words::recorded(&recorder.finish()))
     }
 
     /// Over the lines.
@@ -272,8 +295,8 @@ impl Show {
 
     /// The disk refuses: what was heard before is kept, the rest goes on.
     fn end_recording(&mut self) {
-        if let Some(recorder) = self.recorder.take() {
-            eprintln!("{}", words::recorded(&recorder.finish()));
+        if let Some(told) = self.recorded() {
+            eprintln!("{told}");
         }
     }
 

@@ -80,6 +80,16 @@ impl Following {
         (said, object)
     }
 
+    /// The walk begins at `start`, now; what was said before is forgotten.
+    ///
+    /// # Errors
+    /// As [`Follower::anew`].
+    pub fn begin_anew(&mut self, start: &str) -> Result<(), follow::Error> {
+        self.follower = self.follower.anew(start)?;
+        self.unix_us.clear();
+        Ok(())
+    }
+
     /// Whether the shoe is to be told its floor mode.
     pub fn steers(&self) -> bool {
         self.follower.steers()
@@ -98,7 +108,7 @@ impl Following {
         if follower.path().is_empty() {
             return Err(Error::new("there are no steps to follow in the building"));
         }
-        let truth = recording.and_then(|recording| summary::truth(&follower, recording));
+        let truth = recording.and_then(|recording| recording.truth_in(&follower.building().name));
         let mut told = summary::told(&follower);
         if let Some(truth) = truth {
             told += &format!("\n{}", summary::judged(&follower, truth));

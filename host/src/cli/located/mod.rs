@@ -6,7 +6,7 @@ mod picture;
 mod summary;
 
 pub use following::{Following, finish_and_tell};
-pub use outputs::Wanted;
+pub use outputs::{Wanted, walk};
 
 use super::Error;
 use crate::building::Building;

@@ -1,7 +1,7 @@
 //! The plan of each floor with the paths on it.
 
 use crate::building::picture::{Dots, Look, Mark, Trace, draw_with};
-use crate::follow::Follower;
+use crate::follow::{Follower, runs};
 use crate::particle::State;
 
 /// Colours of the document's map (Foot, 6.2.1): particles green, the path red; the corrected one blue, the truth violet.
@@ -20,16 +20,16 @@ const STOREY_PART_M: f64 = 2.2;
 pub fn draw(follower: &Follower, index: usize, truth: &[[f64; 3]]) -> String {
     let building = follower.building();
     let floor = &building.floors[index];
-    let live = pieces(follower.path().iter().map(|followed| {
+    let live = runs(follower.path().iter().map(|followed| {
         // Whoever searches has no path.
         let place = followed.place.as_ref().filter(|_| followed.state == State::Located)?;
         (place.floor == floor.number).then_some([place.position.x, place.position.y])
     }));
     let past = follower.past();
     let corrected =
-        pieces(past.iter().map(|place| (place.floor == index).then_some([place.position[0], place.position[1]])));
+        runs(past.iter().map(|place| (place.floor == index).then_some([place.position[0], place.position[1]])));
     let here = |z: f64| (z - floor.height_m).abs() < STOREY_PART_M;
-    let truth = pieces(truth.iter().map(|&[x, y, z]| here(z).then_some([x, y])));
+    let truth = runs(truth.iter().map(|&[x, y, z]| here(z).then_some([x, y])));
     let particles = follower.particles();
     let every = particles.len().div_ceil(MOST_DRAWN).max(1);
     let particles = particles.iter().step_by(every).filter(|particle| usize::from(particle.floor) == index);
@@ -54,30 +54,4 @@ fn marks(follower: &Follower, floor: i32) -> Vec<Mark> {
         look,
     })
     .collect()
-}
-
-/// Runs of places.
-fn pieces(places: impl Iterator<Item = Option<[f64; 2]>>) -> Vec<Vec<[f64; 2]>> {
-    let mut pieces: Vec<Vec<[f64; 2]>> = Vec::new();
-    let mut going_on = false;
-    for place in places {
-        match (place, pieces.last_mut()) {
-            (Some(place), Some(last)) if going_on => last.push(place),
-            (Some(place), _) => pieces.push(vec![place]),
-            (None, _) => {}
-        }
-        going_on = place.is_some();
-    }
-    pieces
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_path_that_leaves_a_floor_comes_back_as_another_piece() {
-        let places = [Some([0.0; 2]), Some([1.0, 0.0]), None, Some([2.0, 0.0]), None, None];
-        assert_eq!(pieces(places.into_iter()), [vec![[0.0; 2], [1.0, 0.0]], vec![[2.0, 0.0]]]);
-    }
 }

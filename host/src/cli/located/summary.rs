@@ -4,19 +4,11 @@ use crate::cli::table::Table;
 use crate::evaluation::building::suite::Errors;
 use crate::follow::Follower;
 use crate::particle::State;
-use crate::recording::{Recording, SimulatedTruth};
+use crate::recording::SimulatedTruth;
 use sohle_shared::time::Micros;
 
-/// Metadata that names the building whose frame the truth of a recording is in.
-pub const BUILDING: &str = "building";
 /// Heights within this of a floor belong to it alone. **Units:** m.
 const ON_FLOOR_M: f64 = 0.6;
-
-/// The truth of a recording, if it is one of a walk in the building that is followed.
-pub fn truth<'a>(follower: &Follower, recording: &'a Recording) -> Option<&'a SimulatedTruth> {
-    let there = recording.metadata.get(BUILDING) == Some(&follower.building().name);
-    recording.truth.as_ref().filter(|truth| there && !truth.poses.is_empty())
-}
 
 /// What was found out, and where the person may be at the end.
 pub fn told(follower: &Follower) -> String {
