@@ -17,7 +17,7 @@ pub mod evaluate;
 pub mod graph;
 pub mod line;
 pub mod live;
-mod located;
+pub mod located;
 pub mod parameters;
 mod phone;
 pub mod replay;
@@ -26,6 +26,8 @@ pub mod route;
 pub mod simulate;
 mod suite;
 pub mod table;
+#[cfg_attr(not(feature = "window"), path = "no_window.rs")]
+pub mod window;
 
 pub use error::Error;
 
@@ -63,6 +65,7 @@ enum Command {
     Bench(bench::Args),
     Line(line::Args),
     Live(live::Args),
+    Window(Box<window::Args>),
     #[command(name = "command")]
     Ask(command::Args),
     Parameters(parameters::Args),
@@ -108,6 +111,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Bench(args) => bench::run(args),
         Command::Line(args) => line::run(args),
         Command::Live(args) => live::run(args),
+        Command::Window(args) => window::run(*args),
         Command::Ask(args) => command::run(args),
         Command::Parameters(args) => parameters::run(args),
         Command::Simulate(args) => simulate::run(args),

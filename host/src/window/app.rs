@@ -1,0 +1,273 @@
+//! The window itself: it shows the latest snapshot, and hands on what is asked for. It computes nothing.
+
+use super::dialogs::{Dialog, Wanted};
+use super::engine::{Command, Engine, Kind, Opening, Snapshot};
+use super::gpu::RenderState;
+use super::help;
+use super::latencies::Latencies;
+use super::layout::{Layout, Look, View};
+use super::map::{Map, Scene};
+use super::parameters::Editor;
+use super::{plots, saving, selector, status, toolbar};
+use eframe::egui::{self, CentralPanel, Context, Panel, ThemePreference, Ui, WidgetText};
+use egui_dock::{DockArea, Style, TabViewer};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// All that the window keeps.
+pub struct App {
+    engine: Option<Engine>,
+    snapshot: Arc<Snapshot>,
+    /// Where there is nothing to draw with, the map is missing.
+    map: Option<Map>,
+    ground: Arc<Scene>,
+    layout: Layout,
+    file: Option<PathBuf>,
+    dialog: Dialog,
+    editor: Editor,
+    help: bool,
+    told: String,
+    latencies: Latencies,
+    /// What was opened last.
+    opening: Option<Opening>,
+}
+
+impl App {
+    /// A window that is laid out as its `file` says, and draws the map with `render`.
+    pub fn new(render: Option<&RenderState>, file: Option<PathBuf>) -> Self {
+        let (layout, told) = match file.as_deref().map(Layout::read) {
+            Some(Ok(layout)) => (layout, String::new()),
+            Some(Err(error)) => (Layout::default(), error.to_string()),
+            None => (Layout::default(), String::new()),
+        };
+        Self {
+            engine: None,
+            snapshot: Arc::default(),
+            map: render.map(Map::new),
+            ground: Arc::new(Scene::open_ground()),
+            layout,
+            file,
+            dialog: Dialog::default(),
+            editor: Editor::default(),
+            help: false,
+            told,
+            latencies: Latencies::default(),
+            opening: None,
+        }
+    }
+
+    /// Opens something in the place of what was open.
+    pub fn open(&mut self, opening: Opening, context: &Context) {
+        self.dialog.suggest(Wanted {
+            what: opening.what.to_string(),
+            building: opening.building.as_ref().map(|path| path.display().to_string()).unwrap_or_default(),
+            start: opening.settings.follow.start.clone(),
+        });
+        let context = context.clone();
+        self.opening = Some(opening.clone());
+        self.latencies = Latencies::default();
+        self.snapshot = Arc::default();
+        self.engine = Some(Engine::start(opening, move || context.request_repaint()));
+    }
+
+    /// What is shown.
+    pub fn snapshot(&self) -> &Snapshot {
+        &self.snapshot
+    }
+
+    /// How it is laid out.
+    pub fn layout(&mut self) -> &mut Layout {
+        &mut self.layout
+    }
+
+    /// Asks the engine for something.
+    pub fn ask(&self, command: Command) {
+        if let Some(engine) = &self.engine {
+            engine.ask(command);
+        }
+    }
+
+    /// From steps to pictures, so far.
+    pub fn latency(&self) -> Option<status::Latency> {
+        self.latencies.told()
+    }
+
+    /// Draws the window.
+    pub fn show(&mut self, ui: &mut Ui) {
+        if let Some(snapshot) = self.engine.as_ref().and_then(Engine::take) {
+            self.latencies.arrived(snapshot.stepped);
+            self.snapshot = snapshot;
+        }
+        ui.ctx().set_theme(match self.layout.look {
+            Look::System => ThemePreference::System,
+            Look::Light => ThemePreference::Light,
+            Look::Dark => ThemePreference::Dark,
+        });
+        let mut commands = Vec::new();
+        let snapshot = self.snapshot.clone();
+        let asked = Panel::top("toolbar").show(ui, |ui| toolbar::show(ui, &snapshot, &mut commands)).inner;
+        Panel::bottom("bar").show(ui, |ui| {
+            ui.add_space(2.0);
+            toolbar::bar(ui, &snapshot, &self.told, &mut commands);
+            ui.add_space(2.0);
+        });
+        if self.layout.selector {
+            Panel::left("views").default_size(140.0).show(ui, |ui| selector::show(ui, &mut self.layout));
+        }
+        CentralPanel::no_frame().show(ui, |ui| self.views(ui, &snapshot, &mut commands));
+        for asked in asked {
+            self.obey(ui, asked, &mut commands);
+        }
+        for asked in help::pressed(ui) {
+            self.key(asked, &mut commands);
+        }
+        help::show(ui, &mut self.help);
+        if let Some(wanted) = self.dialog.show(ui) {
+            let opening = wanted.opening(self.opening.as_ref());
+            self.open(opening, ui.ctx());
+        }
+        if let Some(told) = saving::screenshot(ui.ctx()) {
+            self.told = told;
+        }
+        for command in commands {
+            self.ask(command);
+        }
+        self.latencies.painted();
+    }
+
+    fn views(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) {
+        let Layout { map: map_view, cube, plots, dock, .. } = &mut self.layout;
+        let mut views = Views {
+            snapshot,
+            map: self.map.as_mut(),
+            ground: &self.ground,
+            map_view,
+            cube,
+            plots,
+            editor: &mut self.editor,
+            latency: self.latencies.told(),
+            commands,
+        };
+        let style = Style::from_egui(ui.style().as_ref());
+        DockArea::new(dock).style(style).show_inside(ui, &mut views);
+    }
+
+    fn obey(&mut self, ui: &Ui, asked: toolbar::Asked, commands: &mut Vec<Command>) {
+        match asked {
+            toolbar::Asked::Open => self.dialog.ask_recording(),
+            toolbar::Asked::Connect => self.dialog.ask_shoe(),
+            toolbar::Asked::Picture => saving::ask_screenshot(ui.ctx()),
+            toolbar::Asked::Track => commands.push(Command::Export(saving::name("sohle-track", "geojson"))),
+            toolbar::Asked::Record => {
+                let recording = self.snapshot.link.as_ref().is_some_and(|link| link.recording.is_some());
+                commands.push(Command::Record((!recording).then(|| saving::name("sohle-live", "mcap"))));
+            }
+            toolbar::Asked::Selector => self.layout.selector = !self.layout.selector,
+            toolbar::Asked::Look => {
+                self.layout.look = if ui.visuals().dark_mode { Look::Light } else { Look::Dark };
+            }
+            toolbar::Asked::Help => self.help = !self.help,
+        }
+    }
+
+    fn key(&mut self, asked: help::Asked, commands: &mut Vec<Command>) {
+        let [first, last] = self.snapshot.span;
+        let command = match asked {
+            help::Asked::Help => return self.help = !self.help,
+            help::Asked::Open => return self.dialog.ask_recording(),
+            help::Asked::Connect => return self.dialog.ask_shoe(),
+            help::Asked::Play => Command::Play(!self.snapshot.pace.playing),
+            help::Asked::Ahead => Command::StepAhead,
+            help::Asked::Back => Command::StepBack,
+            help::Asked::Home => Command::Jump(first),
+            help::Asked::End => Command::Jump(last),
+        };
+        if self.snapshot.kind == Kind::Replay {
+            commands.push(command);
+        }
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+        self.show(ui);
+    }
+
+    fn on_exit(&mut self) {
+        if let Some(engine) = self.engine.take() {
+            engine.finish();
+        }
+        if let Some(file) = &self.file
+            && let Err(error) = self.layout.write(file)
+        {
+            eprintln!("the layout of the window is not kept: {error}");
+        }
+    }
+}
+
+/// What the views need.
+struct Views<'a> {
+    snapshot: &'a Snapshot,
+    map: Option<&'a mut Map>,
+    ground: &'a Arc<Scene>,
+    map_view: &'a mut super::map::View,
+    cube: &'a mut super::cube::Cube,
+    plots: &'a mut Vec<super::layout::Plot>,
+    editor: &'a mut Editor,
+    latency: Option<status::Latency>,
+    commands: &'a mut Vec<Command>,
+}
+
+impl Views<'_> {
+    fn map(&mut self, ui: &mut Ui) {
+        let Some(map) = &mut self.map else {
+            ui.label("There is nothing to draw the map with: no graphics card, and no software in its place.");
+            return;
+        };
+        let scene = self.snapshot.scene.as_ref().unwrap_or(self.ground);
+        let told = map.show(ui, self.map_view, scene, &self.snapshot.overlay);
+        let place = told.clicked.filter(|_| self.snapshot.whereabouts.is_some());
+        if let Some(place) = place {
+            let [x, y] = place.point;
+            self.commands.push(Command::Start(format!("{},{x:.3},{y:.3}", place.floor)));
+        }
+    }
+}
+
+impl TabViewer for Views<'_> {
+    type Tab = View;
+
+    fn id(&mut self, view: &mut View) -> egui::Id {
+        egui::Id::new(*view)
+    }
+
+    fn title(&mut self, view: &mut View) -> WidgetText {
+        match view {
+            View::Map => "Map".into(),
+            View::Attitude => "Attitude".into(),
+            View::Status => "Status".into(),
+            View::Parameters => "Parameters".into(),
+            View::Plot(number) => self.plots.get(*number).map_or("", |plot| &plot.title).into(),
+        }
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &mut View) {
+        match view {
+            View::Map => self.map(ui),
+            View::Attitude => {
+                self.cube.show(ui, self.snapshot.attitude);
+            }
+            View::Status => status::show(ui, self.snapshot, self.latency),
+            View::Parameters => self.editor.show(ui, self.snapshot, self.commands),
+            View::Plot(number) => {
+                if let Some(plot) = self.plots.get_mut(*number) {
+                    plots::show(ui, *number, plot, self.snapshot, self.commands);
+                }
+            }
+        }
+    }
+
+    fn scroll_bars(&self, _: &View) -> [bool; 2] {
+        [false, false]
+    }
+}

@@ -1,0 +1,161 @@
+//! What computes, so that the window does not: a thread of its own, which plays a recording or listens to a shoe.
+//!
+//! The window gives [`Command`]s and gets [`Snapshot`]s, of which only the latest counts: a window that is slow drops
+//! pictures, never data, since every snapshot has all signals so far.
+
+pub mod drawing;
+mod export;
+mod kept;
+pub mod live;
+pub mod opening;
+pub mod replay;
+pub mod signals;
+pub mod snapshot;
+pub mod walk;
+
+pub use opening::{Opening, What};
+pub use signals::{Signal, Signals};
+pub use snapshot::{Kind, Pace, Snapshot};
+
+use sohle_shared::tracker;
+use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// What the window asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Go on, or pause.
+    Play(bool),
+    /// Play so many times as fast as it was.
+    Speed(f64),
+    /// Go to a time. **Units:** s.
+    Jump(f64),
+    /// Go to the end of the next step.
+    StepAhead,
+    /// Go to the end of the step before.
+    StepBack,
+    /// Begin anew.
+    Reset,
+    /// Wait for a rest.
+    Init,
+    /// Follow the foot without waiting.
+    Track,
+    /// Who is followed is here, in the words of [`crate::follow::parse_start`].
+    Start(String),
+    /// Settings of the tracker.
+    Tracker(Box<tracker::Parameters>),
+    /// Record what is heard into this file, or end that.
+    Record(Option<PathBuf>),
+    /// Write the path into this file.
+    Export(PathBuf),
+}
+
+/// What came of some work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work {
+    /// Something is to be shown.
+    pub changed: bool,
+    /// How long there is nothing to do; nothing until a command comes.
+    pub pause: Option<Duration>,
+}
+
+/// Something to be shown.
+pub trait Source {
+    /// Does what the window asks for.
+    fn obey(&mut self, command: Command);
+
+    /// Works until a time at the latest.
+    fn work(&mut self, until: Instant) -> Work;
+
+    /// What is known now.
+    fn snapshot(&mut self) -> Snapshot;
+}
+
+/// A shoe that has gone is not waited for longer than its own answers take.
+const PATIENCE: Duration = Duration::from_secs(25);
+/// Work in one go, before commands are looked at.
+const TURN: Duration = Duration::from_millis(10);
+/// Between two snapshots.
+const FRAME: Duration = Duration::from_millis(16);
+/// Between two looks for commands when there is nothing to do.
+const IDLE: Duration = Duration::from_secs(3600);
+
+/// The thread, as the window has it. It ends when this is dropped.
+pub struct Engine {
+    commands: Sender<Command>,
+    thread: JoinHandle<()>,
+    latest: Arc<Mutex<Option<Arc<Snapshot>>>>,
+}
+
+impl Engine {
+    /// Opens something in a thread of its own. `wake` is called when there is something to show.
+    pub fn start(opening: Opening, wake: impl Fn() + Send + 'static) -> Self {
+        let (commands, asked) = mpsc::channel();
+        let latest = Arc::new(Mutex::new(None));
+        let post = latest.clone();
+        let publish = move |snapshot: Snapshot| {
+            *post.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(snapshot));
+            wake();
+        };
+        let thread = std::thread::spawn(move || {
+            publish(Snapshot { name: opening.name(), kind: Kind::Opening, ..Snapshot::default() });
+            match opening.open() {
+                Ok(mut source) => run(source.as_mut(), &asked, publish),
+                Err(error) => {
+                    publish(Snapshot { name: opening.name(), fault: Some(error.to_string()), ..Snapshot::default() });
+                }
+            }
+        });
+        Self { commands, thread, latest }
+    }
+
+    /// Asks for something. Nobody hears it when nothing could be opened.
+    pub fn ask(&self, command: Command) {
+        let _ = self.commands.send(command);
+    }
+
+    /// Ends it and waits until it has ended, so that a recording is whole; not for ever.
+    pub fn finish(self) {
+        let Self { commands, thread, .. } = self;
+        drop(commands);
+        let begun = Instant::now();
+        while !thread.is_finished() && begun.elapsed() < PATIENCE {
+            std::thread::sleep(TURN);
+        }
+    }
+
+    /// The latest snapshot, once.
+    pub fn take(&self) -> Option<Arc<Snapshot>> {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+fn run(source: &mut dyn Source, asked: &Receiver<Command>, publish: impl Fn(Snapshot)) {
+    publish(source.snapshot());
+    let mut published = Instant::now();
+    let (mut dirty, mut pause) = (false, Some(Duration::ZERO));
+    loop {
+        let due = dirty.then(|| FRAME.saturating_sub(published.elapsed()));
+        let wait = pause.unwrap_or(IDLE).min(due.unwrap_or(IDLE));
+        match asked.recv_timeout(wait) {
+            Ok(command) => {
+                source.obey(command);
+                asked.try_iter().for_each(|command| source.obey(command));
+                dirty = true;
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+        let work = source.work(Instant::now() + TURN);
+        dirty |= work.changed;
+        pause = work.pause;
+        if dirty && published.elapsed() >= FRAME {
+            publish(source.snapshot());
+            published = Instant::now();
+            dirty = false;
+        }
+    }
+}

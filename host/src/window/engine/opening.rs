@@ -1,0 +1,111 @@
+//! What is to be shown: read by the engine, since a large file takes its time.
+
+use super::Source;
+use super::live::Live;
+use super::replay::Replay;
+use super::walk::{Settings, Walk};
+use crate::building::Building;
+use crate::building::open::{Options, open};
+use crate::link::Address;
+use crate::recording::{self, Profile, Recording};
+use crate::{building, follow, particle, phone};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Why nothing can be shown.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] recording::RecordingError),
+    /// Nor that of a phone.
+    #[error(transparent)]
+    Phone(#[from] phone::sample::ReadError),
+    /// The building cannot be read.
+    #[error(transparent)]
+    Building(#[from] building::Error),
+    /// Nobody can be followed.
+    #[error(transparent)]
+    Follow(#[from] follow::Error),
+    /// There is nothing in it.
+    #[error("{0} has neither samples nor steps")]
+    Empty(String),
+}
+
+/// What is to be opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum What {
+    /// A recording.
+    Recording(PathBuf),
+    /// A shoe.
+    Shoe(Address),
+}
+
+impl fmt::Display for What {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Recording(path) => write!(out, "{}", path.display()),
+            Self::Shoe(address) => write!(out, "{address}"),
+        }
+    }
+}
+
+/// What is to be opened, and how.
+#[derive(Clone, Debug)]
+pub struct Opening {
+    /// What.
+    pub what: What,
+    /// How a recording is laid out; recognised from the content when left out.
+    pub profile: Option<Profile>,
+    /// The building to follow in.
+    pub building: Option<PathBuf>,
+    /// How it is followed.
+    pub settings: Settings,
+}
+
+impl Opening {
+    /// A recording or a shoe, by the steps alone.
+    pub fn of(what: What) -> Self {
+        Self { what, profile: None, building: None, settings: Settings::default() }
+    }
+
+    /// What it is called.
+    pub fn name(&self) -> String {
+        match &self.what {
+            What::Recording(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            What::Shoe(address) => address.to_string(),
+        }
+    }
+
+    /// Opens it.
+    ///
+    /// # Errors
+    /// When recording or building cannot be read, have nothing in them, or do not go together.
+    pub fn open(&self) -> Result<Box<dyn Source>, Error> {
+        let building = self.building.as_ref().map(|path| open(path, &Options::default())).transpose()?;
+        match &self.what {
+            What::Shoe(address) => Ok(Box::new(Live::new(address.clone(), building, &self.settings.follow)?)),
+            What::Recording(path) => self.replay(path, building),
+        }
+    }
+
+    fn replay(&self, path: &Path, building: Option<Building>) -> Result<Box<dyn Source>, Error> {
+        let mut settings = self.settings.clone();
+        let recording = if phone::open::is_phone(path) {
+            if settings.follow.particle == particle::Parameters::default() {
+                settings.follow.particle = particle::Parameters::phone();
+            }
+            let samples = phone::open::open(path)?.samples;
+            let steps = phone::steps(&samples, &phone::Parameters::default());
+            Recording { name: self.name(), steps, ..Recording::default() }
+        } else {
+            recording::open(path, self.profile.as_ref())?
+        };
+        if recording.samples.is_empty() && recording.steps.is_empty() {
+            return Err(Error::Empty(self.name()));
+        }
+        Ok(Box::new(Replay::new(Walk::new(Arc::new(recording), building, settings)?)))
+    }
+}
