@@ -58,11 +58,19 @@ fn until(window: &mut Harness<'static, App>, holds: impl Fn(&App) -> bool) {
     window.run_steps(2);
 }
 
+/// Writes into the field of this name.
+fn write(window: &mut Harness<'static, App>, field: &str, text: &str) {
+    window.get_by_label(field).focus();
+    window.run_steps(4);
+    window.get_by_label(field).type_text(text);
+    window.run_steps(12);
+}
+
 #[test]
 fn without_anything_open_only_what_opens_can_be_pressed() {
     let mut window = window(None);
-    window.run_steps(3);
-    for word in ["Views", "Open…", "Connect…", "Export picture", "?", "◑"] {
+    window.run_steps(12);
+    for word in ["View list", "Open…", "Connect…", "Export picture", "?", "◑"] {
         assert!(!window.get_by_label(word).accesskit_node().is_disabled(), "{word}");
     }
     for word in ["RESET", "INIT", "TRACK", "Start recording", "Export track"] {
@@ -118,8 +126,7 @@ fn settings_are_bounded_and_apply_at_once() {
     let default = sohle_shared::tracker::Parameters::default();
     until(&mut window, |app| app.snapshot().settings.as_deref() == Some(&default));
     // Every setting that is shown has a name that is read out.
-    window.get_by_label("Find").type_text("stance.floor");
-    window.run_steps(3);
+    write(&mut window, "Find", "stance.floor");
     assert!(window.query_all_by_label("stance.floor").next().is_some());
     assert!(window.query_by_label("stance.ceiling").is_none());
 }
@@ -130,14 +137,14 @@ fn views_are_opened_from_the_list_and_plots_are_made() {
     window.run_steps(2);
     let plots = window.state_mut().layout().plots.len();
     window.get_by_label("New plot").click();
-    window.run_steps(3);
+    window.run_steps(12);
     assert!(window.state_mut().layout().plots.len() == plots + 1);
     assert!(window.state_mut().layout().is_open(View::Plot(plots)));
     window.get_by_label("Usual places").click();
-    window.run_steps(3);
+    window.run_steps(12);
     assert!(!window.state_mut().layout().is_open(View::Plot(plots)));
-    window.get_by_label("Views").click();
-    window.run_steps(3);
+    window.get_by_label("View list").click();
+    window.run_steps(12);
     assert!(window.query_by_label("New plot").is_none(), "the list is hidden");
 }
 
@@ -146,12 +153,12 @@ fn all_keys_are_told_in_the_help() {
     let mut window = window(None);
     window.run_steps(2);
     window.key_press(Key::F1);
-    window.run_steps(4);
+    window.run_steps(12);
     for key in ["A", "S", "P", "Y", "X", "Space", "Ctrl+O"] {
         assert!(window.query_all_by_label(key).next().is_some(), "{key}");
     }
     window.get_by_label("Close").click();
-    window.run_steps(4);
+    window.run_steps(12);
     assert!(window.query_by_label("Keys and mouse").is_none());
 }
 
@@ -160,16 +167,15 @@ fn dialogs_say_what_is_missing() {
     let mut window = window(None);
     window.run_steps(2);
     window.key_press_modifiers(Modifiers::COMMAND, Key::K);
-    window.run_steps(4);
+    window.run_steps(12);
     let connect = |window: &Harness<'static, App>| window.get_by_label("Connect").accesskit_node().is_disabled();
     assert!(connect(&window));
-    window.get_by_label("Address").type_text("tcp:nowhere.invalid:1");
-    window.run_steps(4);
+    write(&mut window, "Address", "tcp:nowhere.invalid:1");
     assert!(!connect(&window));
     window.get_by_label("Cancel").click();
-    window.run_steps(4);
+    window.run_steps(12);
     window.get_by_label("Open…").click();
-    window.run_steps(4);
+    window.run_steps(12);
     assert!(window.get_by_label("Play").accesskit_node().is_disabled());
 }
 
@@ -201,7 +207,7 @@ fn a_broken_layout_is_told_and_the_usual_one_is_there() {
     let file = home.path().join("window.json");
     std::fs::write(&file, "{\"dock\": 7}").unwrap();
     let mut window = window(Some(file));
-    window.run_steps(3);
+    window.run_steps(12);
     assert!(window.query_all_by_label_contains("where it was at first").next().is_some());
     assert_eq!(window.state_mut().layout().plots, Layout::default().plots);
 }

@@ -38,7 +38,7 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) -> Ve
                 asked.push(what);
             }
         };
-        own(ui, true, "Views", "Shows or hides the list of views", Asked::Selector);
+        own(ui, true, "View list", "Shows or hides the list of views", Asked::Selector);
         ui.separator();
         own(ui, true, "Open…", "Plays a recording (Ctrl+O)", Asked::Open);
         own(ui, true, "Connect…", "Connects to a shoe (Ctrl+K)", Asked::Connect);

@@ -22,6 +22,7 @@ pub struct InBuilding {
     /// Follows the steps through this building: any format that 'sohle building show' takes
     #[arg(long, value_name = "FILE|DIR")]
     pub building: Option<PathBuf>,
+    /// How.
     #[command(flatten)]
     pub how: How,
 }
@@ -43,6 +44,7 @@ pub struct How {
     /// What the map tells the tracker of the ground [default: document]
     #[arg(long, value_enum, value_name = "WHAT")]
     floor_mode: Option<Steering>,
+    /// Where it goes beside the folder of results.
     #[command(flatten)]
     pub wanted: Wanted,
 }

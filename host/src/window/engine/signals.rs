@@ -296,11 +296,11 @@ mod tests {
     fn what_was_handed_on_does_not_change_and_shares_what_is_whole() {
         let mut history = history(1_000);
         let before = history.share();
-        let copy = before.clone();
+        let copy = format!("{before:?}");
         history.push(1e3, &[0.0; Signal::COUNT]);
         history.push(5.0, &[9.0; Signal::COUNT]);
         let after = history.share();
-        assert_eq!(before, copy);
+        assert_eq!(format!("{before:?}"), copy);
         assert_eq!(after.span(), Some([0.0, 1e3]), "a row from before the last is left out");
         assert!(Arc::ptr_eq(&before.pieces[0], &after.pieces[0]));
     }
