@@ -2,8 +2,9 @@
 
 use super::modes::{FloorModes, Steering};
 use super::reach::Reach;
-use super::{Error, parse_start};
+use super::{Error, parse_start, sight};
 use crate::building::Building;
+use crate::fixes::{Observation, Outliers};
 use crate::particle::{Estimate, Map, Parameters, Particle, ParticleFilter, PastPlace, Start, State};
 use nalgebra::Vector3;
 use sohle_shared::step::{FloorMode, Step};
@@ -170,6 +171,11 @@ impl Follower {
         Said { estimate, room, mode, unusual }
     }
 
+    /// Takes in what another source says of the place; returns what is known with it. It counts where the person is now.
+    pub fn observe(&mut self, observation: &Observation) -> &Estimate {
+        self.filter.sight(&sight(observation, &Outliers::default()))
+    }
+
     /// The building.
     pub fn building(&self) -> &Arc<Building> {
         &self.building
@@ -280,6 +286,27 @@ mod tests {
         let error = (last.estimate.place().unwrap().position - truth).xy().norm();
         // Where the long step led is not known: the rooms of the rest of the walk tell, as after an unknown start.
         assert!(last.estimate.state != State::Lost && error < 1.5, "{:?} {error}", last.estimate.state);
+    }
+
+    #[test]
+    fn a_position_finds_who_starts_anywhere_and_an_outlier_does_not_carry_away() {
+        let walk = walk(&["W02", "W05", "hall", "E03"]);
+        let mut follower = from("anywhere");
+        let near = |truth: &Vector3<f64>, off: f64| Observation::position(Micros(0), [truth.x + off, truth.y], 2.0);
+        let mut alone = from("anywhere");
+        for (index, (step, truth)) in walk.steps.iter().zip(&walk.truth).enumerate() {
+            follower.step(step);
+            alone.step(step);
+            if index % 5 == 4 {
+                follower.observe(&near(truth, if index % 20 == 19 { 15.0 } else { 0.5 }));
+            }
+        }
+        let first = |follower: &Follower| {
+            follower.path().iter().position(|followed| followed.state == State::Located).unwrap_or(usize::MAX)
+        };
+        assert!(first(&follower) < first(&alone), "{} {}", first(&follower), first(&alone));
+        let off = (follower.estimate().place().unwrap().position - walk.truth.last().unwrap()).xy().norm();
+        assert!(off < 1.5, "{off}");
     }
 
     #[test]

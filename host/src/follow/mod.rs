@@ -12,6 +12,7 @@ mod orders;
 mod reach;
 mod runs;
 pub mod scene;
+mod sight;
 pub mod start;
 
 pub use error::Error;
@@ -20,4 +21,5 @@ pub use json::{line, mode_word};
 pub use modes::{FloorModes, Shares, Steering};
 pub use orders::Orders;
 pub use runs::runs;
+pub use sight::sight;
 pub use start::parse as parse_start;

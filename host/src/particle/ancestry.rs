@@ -85,6 +85,23 @@ impl Ancestry {
         }
     }
 
+    /// Particles were drawn without a step: particle `i` is a copy of what `parents[i]` was before.
+    pub fn redraw(&mut self, parents: &[usize]) {
+        let before = std::mem::take(&mut self.leaves);
+        if parents.iter().any(|&parent| parent >= before.len()) {
+            // Nothing was remembered of them.
+            self.clear();
+            return;
+        }
+        self.leaves = parents.iter().map(|&parent| before[parent]).collect();
+        for &leaf in &self.leaves {
+            self.nodes[leaf as usize].children += 1;
+        }
+        for leaf in before {
+            self.release(leaf);
+        }
+    }
+
     /// One that held the node does not any more.
     fn release(&mut self, mut index: u32) {
         while let Some(node) = self.nodes.get_mut(index as usize) {
@@ -166,6 +183,21 @@ impl Ancestry {
 mod tests {
     use super::super::random::{Purpose, Stream};
     use super::*;
+
+    #[test]
+    fn copies_without_a_step_share_their_past() {
+        let at = |x: f32| Particle { x, weight: 1.0, ..Particle::default() };
+        let mut ancestry = Ancestry::default();
+        ancestry.grow(&[at(1.0), at(5.0)], None, 1);
+        ancestry.redraw(&[1, 1, 1]);
+        let copies = [at(5.0), at(5.0), at(5.0)];
+        assert_eq!(ancestry.past(&copies, |_| true).iter().map(|past| past.position[0]).collect::<Vec<_>>(), [5.0]);
+        ancestry.grow(&[at(6.0), at(7.0), at(8.0)], None, 2);
+        let past = ancestry.past(&[at(6.0), at(7.0), at(8.0)], |_| true);
+        assert_eq!(past.iter().map(|past| past.position[0]).collect::<Vec<_>>(), [5.0, 7.0]);
+        ancestry.redraw(&[9]);
+        assert!(ancestry.past(&copies, |_| true).is_empty());
+    }
     use proptest::prelude::*;
 
     fn at(x: f32) -> Particle {

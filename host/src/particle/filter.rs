@@ -10,6 +10,7 @@ use super::motion::{self, Moved};
 use super::parameters::{Method, Parameters};
 use super::random::{Purpose, Stream};
 use super::resampling;
+use super::sight::Sight;
 use super::start::{self, Patch, Seeded, Start};
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
@@ -160,6 +161,24 @@ impl ParticleFilter {
         self.remember(parents.as_deref(), step.index);
         let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
         self.tell(Some(step.stance_end), step.index, total, moved.effective(), likelihood);
+        &self.estimate
+    }
+
+    /// Takes in what another source says of the place now; returns what is known with it. A floor that is not in the
+    /// building is not heard.
+    pub fn sight(&mut self, sight: &Sight) -> &Estimate {
+        let floor = sight.floor.and_then(|number| self.map.floor(number));
+        self.number += 1;
+        let moved = sight.weigh(&mut self.particles, floor);
+        let parents = match self.parameters.method {
+            Method::Documented => self.draw_documented(&moved),
+            Method::Covariance => self.draw(&moved),
+        };
+        if let Some(parents) = parents {
+            self.ancestry.redraw(&parents);
+        }
+        let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
+        self.tell(self.estimate.time, self.estimate.step, total, moved.effective(), moved.likelihood());
         &self.estimate
     }
 

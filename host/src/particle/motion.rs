@@ -26,6 +26,16 @@ pub(super) struct Moved {
 }
 
 impl Moved {
+    /// Together with another part of the cloud.
+    pub fn with(self, other: Self) -> Self {
+        Self {
+            before: self.before + other.before,
+            after: self.after + other.after,
+            squares: self.squares + other.squares,
+            alive: self.alive + other.alive,
+        }
+    }
+
     /// Mean likelihood of the step over the cloud.
     pub fn likelihood(&self) -> f64 {
         if self.before > 0.0 { self.after / self.before } else { 0.0 }
@@ -64,12 +74,7 @@ pub(super) fn advance(
     };
     // Collected in order and added in order: the sum does not depend on who was first.
     let parts: Vec<Moved> = particles.par_chunks_mut(BLOCK).enumerate().map(block).collect();
-    parts.into_iter().fold(Moved::default(), |sum, part| Moved {
-        before: sum.before + part.before,
-        after: sum.after + part.after,
-        squares: sum.squares + part.squares,
-        alive: sum.alive + part.alive,
-    })
+    parts.into_iter().fold(Moved::default(), Moved::with)
 }
 
 /// In [-pi, pi).

@@ -1,0 +1,115 @@
+//! What somebody else says of the place: how likely it makes each particle.
+//!
+//! # Source
+//! A mixture of what is right, with its covariance, and of what is anywhere: Thrun, Burgard and Fox, "Probabilistic
+//! robotics", 6.3.
+
+use super::cloud::{BLOCK, Particle};
+use super::motion::Moved;
+use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
+
+/// What was seen of the place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Seen {
+    /// A place and its covariance. **Units:** m, m²; **Frame:** building.
+    Place([f64; 2], Matrix2<f64>),
+    /// The distance to an anchor in space, how much higher that is than the sensor, and the standard deviation. **Units:** m.
+    Range {
+        /// **Frame:** building.
+        anchor: [f64; 2],
+        /// How much higher it is.
+        above_m: f64,
+        /// In space.
+        metres: f64,
+        /// Standard deviation.
+        sigma_m: f64,
+    },
+}
+
+/// A place or a distance that a source tells of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sight {
+    /// What.
+    pub seen: Seen,
+    /// Number of the floor, if the source knows it.
+    pub floor: Option<i32>,
+    /// How likely it has nothing to do with the place, against a particle that fits it exactly: such a sight costs no
+    /// particle more than this. From 1e-9 to 1.
+    pub outlier: f64,
+}
+
+impl Sight {
+    /// Weighs the particles. `floor` is the index of the floor that the source names.
+    pub(super) fn weigh(&self, particles: &mut [Particle], floor: Option<usize>) -> Moved {
+        let outlier = if self.outlier.is_finite() { self.outlier.clamp(1e-9, 1.0) } else { 1.0 };
+        let inverse = match self.seen {
+            Seen::Place(_, covariance) => covariance.try_inverse().unwrap_or_else(Matrix2::zeros),
+            Seen::Range { sigma_m, .. } => Matrix2::identity() * (sigma_m * sigma_m).max(1e-6).recip(),
+        };
+        let squared = |particle: &Particle| {
+            let at = Vector2::new(f64::from(particle.x), f64::from(particle.y));
+            match self.seen {
+                Seen::Place(place, _) => {
+                    let off = at - Vector2::from(place);
+                    off.dot(&(inverse * off))
+                }
+                Seen::Range { anchor, above_m, metres, .. } => {
+                    let off = (at - Vector2::from(anchor)).norm().hypot(above_m) - metres;
+                    off * off * inverse[(0, 0)]
+                }
+            }
+        };
+        let weigh = |block: &mut [Particle]| {
+            let mut moved = Moved::default();
+            for particle in block {
+                moved.before += f64::from(particle.weight);
+                // Between two floors nobody is on the wrong one.
+                let there =
+                    floor.is_none_or(|floor| particle.is_in_connector() || usize::from(particle.floor) == floor);
+                let fits = if there { (-0.5 * squared(particle)).exp() } else { 0.0 };
+                particle.weight *= ((fits + outlier) / (1.0 + outlier)) as f32;
+                let weight = f64::from(particle.weight);
+                moved.after += weight;
+                moved.squares += weight * weight;
+                moved.alive += usize::from(particle.weight > 0.0);
+            }
+            moved
+        };
+        // Added in order: the sum does not depend on who was first.
+        let parts: Vec<Moved> = particles.par_chunks_mut(BLOCK).map(weigh).collect();
+        parts.into_iter().fold(Moved::default(), Moved::with)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud() -> Vec<Particle> {
+        let at = |x: f32| Particle { x, y: 5.0, weight: 1.0, connector: Particle::ON_FLOOR, ..Particle::default() };
+        [5.0, 6.0, 15.0].map(at).to_vec()
+    }
+
+    #[test]
+    fn a_place_weighs_by_its_covariance_and_an_outlier_costs_no_more_than_it_may() {
+        let mut particles = cloud();
+        let seen = Seen::Place([5.0, 5.0], Matrix2::new(4.0, 0.0, 0.0, 1.0));
+        let moved = Sight { seen, floor: None, outlier: 0.01 }.weigh(&mut particles, None);
+        let expected = [1.0, ((-0.125_f32).exp() + 0.01) / 1.01, ((-12.5_f32).exp() + 0.01) / 1.01];
+        for (particle, expected) in particles.iter().zip(expected) {
+            assert!((particle.weight - expected).abs() < 1e-6, "{particle:?} {expected}");
+        }
+        assert!(moved.before == 3.0 && (moved.after - f64::from(expected.iter().sum::<f32>())).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_floor_and_a_range_weigh_too() {
+        let mut particles = cloud();
+        particles[1].floor = 1;
+        let seen = Seen::Range { anchor: [9.0, 5.0], above_m: 3.0, metres: 5.0, sigma_m: 0.2 };
+        Sight { seen, floor: Some(0), outlier: 1e-3 }.weigh(&mut particles, Some(0));
+        assert!((particles[0].weight - 1.0).abs() < 1e-6, "{particles:?}");
+        assert!(particles[1].weight < 2e-3 && particles[2].weight < 2e-3, "{particles:?}");
+    }
+}
