@@ -1,12 +1,16 @@
-//! `sohle bench`: what the particle filter costs on this machine.
+//! `sohle bench`: what the particle filter costs on this machine, and what steps with positions do.
 
 use super::table::Table;
 use super::{Error, print};
+use crate::evaluation::fixes::pace::{STEP_US, Walker};
+use crate::fixes::adjustment::Adjustment;
+use crate::fixes::extended::Extended;
+use crate::fixes::{Documented, Method, Smoother, Start, smoother};
 use crate::particle::speed::{Work, building};
 use clap::ValueEnum;
 use std::time::{Duration, Instant};
 
-/// Times the particle filter: moves, drawing, clusters, a whole step, over particles, walls and floors
+/// Times the particle filter over particles, walls and floors, and steps with positions over the length of the walk
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Each figure is the median of several runs. The reference is a textbook's move without walls, in the same \
@@ -72,10 +76,62 @@ pub fn run(args: Args) -> Result<(), Error> {
         bar.inc(1);
     }
     bar.finish_and_clear();
+    let paces: Vec<Pace> = HOURS.into_iter().flat_map(paces).collect();
     match args.format {
-        Format::Table => print(&table(&rows).text()),
-        Format::Json => print(&format!("{}\n", serde_json::to_string_pretty(&rows)?)),
+        Format::Table => print(&[table(&rows), paces_table(&paces)].map(|table| table.text()).join("\n")),
+        Format::Json => print(&format!(
+            "{}\n",
+            serde_json::to_string_pretty(&serde_json::json!({"particles": rows, "fixes": paces}))?
+        )),
     }
+}
+
+/// Walks of so many hours, and the steps at their ends that are timed.
+const HOURS: [f64; 3] = [0.1, 1.0, 10.0];
+const TIMED: usize = 200;
+
+/// A step with a position at the end of a long walk. **Units:** as the names say.
+#[derive(serde::Serialize)]
+struct Pace {
+    method: &'static str,
+    hours: f64,
+    median_us: f64,
+    longest_us: f64,
+}
+
+fn paces(hours: f64) -> [Pace; 3] {
+    let (documented, start) = (Documented::default(), Start::default());
+    // The adjustment takes all steps again with each position: only some of those on the way are told.
+    [
+        pace("least squares", hours, &mut Adjustment::new(&documented, &start), 500),
+        pace("extended", hours, &mut Extended::new(&documented, &start), 1),
+        pace("smoother", hours, &mut Smoother::new(&smoother::Parameters::default(), &start), 1),
+    ]
+}
+
+fn pace(method: &'static str, hours: f64, told: &mut dyn Method, every: usize) -> Pace {
+    let steps = (hours * 3.6e9 / STEP_US as f64) as usize;
+    let mut walker = Walker::default();
+    (0..steps).for_each(|step| walker.step(told, step % every == 0));
+    let mut times: Vec<Duration> = (0..TIMED)
+        .map(|_| {
+            let start = Instant::now();
+            walker.step(told, true);
+            start.elapsed()
+        })
+        .collect();
+    times.sort_unstable();
+    let us = |time: Duration| time.as_secs_f64() * 1e6;
+    Pace { method, hours, median_us: us(times[TIMED / 2]), longest_us: us(times[TIMED - 1]) }
+}
+
+fn paces_table(paces: &[Pace]) -> Table {
+    let mut table = Table::new("a step with a position", &["after hours", "median us", "longest us"]);
+    for pace in paces {
+        let cells = [format!("{:.1}", pace.hours), format!("{:.1}", pace.median_us), format!("{:.1}", pace.longest_us)];
+        table.row(pace.method, cells.to_vec());
+    }
+    table
 }
 
 fn measure(case: &Case, runs: u32) -> Result<Row, Error> {

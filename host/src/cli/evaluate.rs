@@ -1,10 +1,10 @@
 //! `sohle evaluate`: every recording of a manifest tracked and judged.
 
-use super::suite as table;
+use super::suite::{self as table, drawn};
 use super::{Error, parameters, print, progress};
 use crate::evaluation::building::{suite, unknown};
-use crate::evaluation::phone;
 use crate::evaluation::{Manifest, Perturbation, Report, Settings, evaluate};
+use crate::evaluation::{fixes, phone};
 use crate::{particle, toml_file};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -30,6 +30,9 @@ pub struct Args {
     /// All that is random in a suite follows from it
     #[arg(long, value_name = "N", default_value_t = 1, requires = "suite")]
     seed: u64,
+    /// Draws the recorded walk of the suite 'fixes', as each method has it, into this folder
+    #[arg(long, value_name = "DIR", requires = "suite")]
+    pictures: Option<PathBuf>,
     /// How to print the scores
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -61,6 +64,8 @@ enum Suite {
     Building,
     /// Recorded walks with a phone in the hand, on the plans of their floors
     Phone,
+    /// Steps with positions of another source: the document's comparison (Fix, 3.4) on a recorded walk, and simulated walks
+    Fixes,
 }
 
 /// How the scores are printed.
@@ -128,9 +133,12 @@ const LONG_STOPS: usize = 12;
 const PHONE_SEEDS: u64 = 5;
 
 fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
+    if args.pictures.is_some() && which != Suite::Fixes {
+        return Err(Error::new("--pictures draws the suite 'fixes' only"));
+    }
     let default = match &args.particle {
         Some(path) => toml_file::read("settings of the particle filter", path)?,
-        None if which == Suite::Phone => particle::Parameters::phone(),
+        None if matches!(which, Suite::Phone | Suite::Fixes) => particle::Parameters::phone(),
         None => particle::Parameters::default(),
     };
     let (mut text, json) = match which {
@@ -163,6 +171,17 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
             let steps = crate::phone::Parameters::default();
             let rows = phone::suite::run(&phone::walk::all()?, (&steps, &default), &seeds)?;
             (table::phone(&rows).text(), serde_json::json!({"phone": rows}))
+        }
+        Suite::Fixes => {
+            let walk = phone::walk::eight()?;
+            let comparison = fixes::eight::Comparison::of(&walk, &crate::phone::Parameters::default());
+            if let Some(folder) = &args.pictures {
+                drawn::fixes(&walk, &comparison, folder)?;
+            }
+            let rows = comparison.rows(&default, args.seed)?;
+            let walks = fixes::walks::rows(args.seed)?;
+            let text = [table::eight(&rows), table::walks(&walks)].map(|table| table.text()).join("\n");
+            (text, serde_json::json!({"eight": rows, "walks": walks}))
         }
     };
     if args.format == Format::Json {

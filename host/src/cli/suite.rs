@@ -1,8 +1,11 @@
-//! The figures of the suites as tables.
+//! The figures of the suites as tables, and pictures of them.
+
+pub mod drawn;
 
 use super::table::Table;
 use crate::evaluation::building::suite::{Errors, KnownRow, OtherRow};
 use crate::evaluation::building::unknown::{LostRow, UnknownRow};
+use crate::evaluation::fixes::{Bounds, Figures, eight, walks};
 use crate::evaluation::phone::suite::Row;
 
 fn metres(errors: &Errors) -> String {
@@ -175,6 +178,57 @@ pub fn phone(rows: &[Row]) -> Table {
                 cell(row.unknown.and_then(|found| found.located_s), 0),
                 cell(row.unknown.and_then(|found| found.live_m), 2),
                 cell(row.unknown.and_then(|found| found.corrected_m), 2),
+            ],
+        );
+    }
+    table
+}
+
+fn spread(figures: &Figures) -> Vec<String> {
+    let errors = &figures.errors;
+    [figures.rmse_m, errors.p75_m, errors.p95_m, errors.worst_m].map(|metres| format!("{metres:.2}")).to_vec()
+}
+
+/// The recorded walk with positions (Fix, 3.4).
+pub fn eight(rows: &[eight::Row]) -> Table {
+    let headings = ["start", "positions Hz", "RMSE m", "75 % m", "95 % m", "worst m"];
+    let mut table = Table::new("hcu eight, steps and positions", &headings);
+    for row in rows {
+        let mut cells = vec![row.start.to_owned(), format!("{:.3}", row.rate_hz)];
+        cells.extend(spread(&row.figures));
+        table.row(row.method, cells);
+    }
+    table
+}
+
+/// Simulated walks with positions.
+pub fn walks(rows: &[walks::Row]) -> Table {
+    let headings = [
+        "sigma m",
+        "extended RMSE m",
+        "smoother m",
+        "95 % m",
+        "corrected m",
+        "innovation (95 %)",
+        "estimation (95 %)",
+        "outliers doubted %",
+        "others %",
+    ];
+    let bounds = |bounds: &Bounds| format!("{:.2} ({:.2} - {:.2})", bounds.mean, bounds.low, bounds.high);
+    let mut table = Table::new("simulated walks, wrong with the positions", &headings);
+    for row in rows {
+        table.row(
+            row.wrong,
+            vec![
+                format!("{:.0}", row.sigma_m),
+                format!("{:.2}", row.extended.rmse_m),
+                format!("{:.2}", row.live.rmse_m),
+                format!("{:.2}", row.live.errors.p95_m),
+                format!("{:.2}", row.corrected.rmse_m),
+                bounds(&row.innovation),
+                bounds(&row.estimation),
+                format!("{:.0}", row.outliers_doubted_percent),
+                format!("{:.1}", row.others_doubted_percent),
             ],
         );
     }

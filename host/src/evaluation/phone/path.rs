@@ -37,6 +37,14 @@ impl Path {
         Some([0, 1].map(|axis| from[axis] + part * (to[axis] - from[axis])))
     }
 
+    /// It was here at this time, which is not before the last; a later word on the same time replaces the first.
+    pub fn note(&mut self, time: Micros, place: [f64; 2]) {
+        match self.0.last_mut() {
+            Some(last) if last.0 >= time => last.1 = place,
+            _ => self.0.push((time, place)),
+        }
+    }
+
     /// Where it was at all way-points; nothing without a path.
     fn at_all(&self, points: &[WayPoint]) -> Vec<[f64; 2]> {
         points.iter().filter_map(|point| self.at(point.time)).collect()

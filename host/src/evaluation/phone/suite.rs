@@ -10,7 +10,7 @@ use sohle_shared::time::Micros;
 use std::sync::Arc;
 
 /// How well somebody knows where a walk begins (standard deviation). **Units:** m.
-const START_SIGMA_M: f32 = 0.3;
+pub const START_SIGMA_M: f32 = 0.3;
 /// And in which direction, from the first leg. **Units:** rad.
 const START_HEADING_SIGMA: f32 = 0.2;
 

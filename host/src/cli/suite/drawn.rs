@@ -1,0 +1,45 @@
+//! Pictures of the suites.
+
+use crate::building::picture::{Dots, Trace, draw_with};
+use crate::cli::Error;
+use crate::evaluation::fixes::eight::Comparison;
+use crate::evaluation::phone::walk::PhoneWalk;
+use crate::export::{file, png};
+use std::path::Path;
+
+/// Rates of positions that are drawn, and the names of the pictures. **Units:** Hz.
+const RATES: [(f64, &str); 2] = [(1.0, "fixes-1-hz"), (0.1, "fixes-0.1-hz")];
+
+/// The recorded walk on its floor, as each method has it (Fix, 3.4).
+pub fn fixes(walk: &PhoneWalk, comparison: &Comparison<'_>, folder: &Path) -> Result<(), Error> {
+    let Some(floor) = walk.building.floor(walk.floor) else { return Ok(()) };
+    file::folder(folder)?;
+    for (rate_hz, name) in RATES {
+        let (mut dots, mut traces) = (Vec::new(), Vec::new());
+        for (label, path) in comparison.paths(rate_hz) {
+            let places: Vec<_> = path.0.iter().map(|&(_, place)| place).collect();
+            let (colour, width) = look(label);
+            match label {
+                "positions" => dots.push(Dots { label, colour, places }),
+                _ => traces.push(Trace { label, colour, width, pieces: vec![places] }),
+            }
+        }
+        let drawing = draw_with(&walk.building, floor, &[], &dots, &traces);
+        file::write(&folder.join(format!("{name}.svg")), drawing.as_bytes())?;
+        file::write(&folder.join(format!("{name}.png")), &png::render(&drawing)?)?;
+    }
+    Ok(())
+}
+
+/// Colour and width of a line.
+fn look(label: &str) -> (&'static str, f64) {
+    match label {
+        "positions" => ("#8c8c8c", 0.0),
+        "steps alone" => ("#b07f3f", 1.0),
+        "Kalman" => ("#3a9b57", 1.2),
+        "extended Kalman" => ("#1c8f9c", 1.2),
+        "least squares" => ("#c8322d", 1.2),
+        "smoother" => ("#2456b4", 2.4),
+        _ => ("#8a3fb0", 1.6),
+    }
+}

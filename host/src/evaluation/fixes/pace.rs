@@ -1,0 +1,71 @@
+//! A walk of hours, step by step and position by position, to be timed.
+
+use crate::fixes::{Method, Observation};
+use nalgebra::{Matrix4, Vector3, Vector4};
+use sohle_shared::sample::ClippedSamples;
+use sohle_shared::step::{FloorMode, Step, StepQuality};
+use sohle_shared::time::Micros;
+
+/// From step to step. **Units:** us.
+pub const STEP_US: i64 = 600_000;
+/// Rounds of a hundred steps, so that the walk comes by where it was.
+const ROUND: u32 = 100;
+
+/// A walk round and round, with a position for each step. They are right up to something that comes again and again.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Walker {
+    count: u32,
+    place: [f64; 2],
+    heading: f64,
+}
+
+impl Walker {
+    /// Makes a step and, if it is `told` of it, hears of a position; both go to the method.
+    pub fn step<M: Method + ?Sized>(&mut self, method: &mut M, told: bool) {
+        let time = Micros(i64::from(self.count) * STEP_US);
+        let turn = std::f64::consts::TAU / f64::from(ROUND);
+        let length = 0.7;
+        let sigmas = Vector4::new(0.02_f32, 0.02, 0.02, 0.005);
+        let step = Step {
+            index: self.count,
+            stance_start: time,
+            stance_end: time,
+            displacement: Vector3::new(length as f32, 0.0, 0.0),
+            turn: turn as f32,
+            covariance: Matrix4::from_diagonal(&sigmas.component_mul(&sigmas)),
+            mode: FloorMode::Level,
+            quality: StepQuality::default(),
+            clipped: ClippedSamples::default(),
+        };
+        let (sin, cos) = self.heading.sin_cos();
+        self.place = [self.place[0] + length * cos, self.place[1] + length * sin];
+        self.heading += turn;
+        method.step(&step);
+        let noise = |part: f64| (f64::from(self.count) * part).sin();
+        if told {
+            let said = [self.place[0] + noise(12.9898), self.place[1] + noise(78.233)];
+            method.observe(&Observation::position(time, said, 1.0));
+        }
+        self.count += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixes::{Smoother, Start, smoother};
+
+    #[test]
+    fn after_an_hour_the_smoother_holds_no_more_than_before_and_knows_the_place() {
+        let parameters = smoother::Parameters { window: 30, ..smoother::Parameters::default() };
+        let (mut walker, mut smoother) = (Walker::default(), Smoother::new(&parameters, &Start::default()));
+        for _ in 0..6_000 {
+            walker.step(&mut smoother, true);
+            smoother.take_settled();
+        }
+        assert_eq!(smoother.open_part().len(), 30);
+        let place = smoother.estimate().unwrap().place;
+        let off = (place[0] - walker.place[0]).hypot(place[1] - walker.place[1]);
+        assert!(off < 1.0, "{off}");
+    }
+}
