@@ -2,9 +2,10 @@
 
 use super::located::{Following, finish_and_tell};
 use super::table::Table;
-use super::{Error, Output, print};
+use super::{Error, Output, fixes, print};
 use crate::export::picture::{Line, Picture, Placement, Role};
 use crate::export::{self, Named};
+use crate::fixes::smoother;
 use crate::phone::{self, Parameters};
 use crate::toml_file;
 use crate::track::Track;
@@ -20,6 +21,8 @@ pub struct Replay<'a> {
     pub compare: bool,
     /// Who is followed, if there is a building.
     pub following: Option<Following>,
+    /// Positions of other sources.
+    pub fixes: Option<&'a Path>,
     /// Where the results go.
     pub output: &'a Output,
     /// Tells nothing.
@@ -68,7 +71,13 @@ impl Replay<'_> {
             print(&format!("{}\n{}\n\n{}\n", picture.title, picture.note, table.text()))?;
             print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;
         }
-        let (Some(mut following), Some(track)) = (self.following, tracks.first()) else { return Ok(()) };
+        let Some(track) = tracks.first() else { return Ok(()) };
+        let incoming =
+            fixes::incoming(self.fixes, self.following.as_ref(), Some(0), &smoother::Parameters::phone(), self.quiet)?;
+        let Some(mut following) = self.following else {
+            return fixes::alone(incoming, &track.steps, &folder, self.quiet);
+        };
+        following.hearing(incoming);
         for step in &track.steps {
             following.step(step, None);
         }

@@ -1,10 +1,13 @@
 //! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
 
+use super::fixes::{alone, incoming};
 use super::located::{Following, InBuilding, finish_and_tell};
 use super::phone::Replay;
 use super::report::{Report, Settings};
 use super::{Error, Output, convert, parameters, print};
 use crate::calibration;
+use crate::fixes::smoother;
+use crate::recording::live::BEGAN;
 use crate::recording::{self, Profile};
 use crate::{particle, phone};
 use std::path::PathBuf;
@@ -16,7 +19,7 @@ use std::path::PathBuf;
 that holds its truth (of 'sohle demo' or 'sohle simulate') is judged by it.\n\n\
 Examples:\n  sohle replay walk.csv --compare\n  sohle replay sohle-out/demo/recording.mcap --out again\n  \
 sohle replay walk.mcap --parameters mine.toml --origin 48.2087,16.3726,35\n  \
-sohle replay walk.mcap --building buildings/twin.geojson --start entrances"
+sohle replay walk.mcap --building buildings/twin.geojson --start entrances --fixes positions.jsonl"
 )]
 pub struct Args {
     /// The recording: MCAP of this program, any layout that --profile can name, or a walk with a phone
@@ -33,6 +36,9 @@ pub struct Args {
     /// Tracks with the settings of the source document too, side by side
     #[arg(long)]
     compare: bool,
+    /// Positions and ranges of other sources, a JSON object to a line (docs/fixes.md); '-' is the standard input
+    #[arg(long, value_name = "FILE|-")]
+    fixes: Option<PathBuf>,
     #[command(flatten)]
     place: InBuilding,
     #[command(flatten)]
@@ -41,7 +47,7 @@ pub struct Args {
 
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args { file, profile, parameters, calibration, compare, place, output } = args;
+    let Args { file, profile, parameters, calibration, compare, fixes, place, output } = args;
     let quiet = output.quiet || place.how.wanted.takes_stdout();
     if phone::open::is_phone(&file) {
         let useless = [("--profile", profile.is_some()), ("--calibration", calibration.is_some())];
@@ -53,7 +59,8 @@ pub fn run(args: Args) -> Result<(), Error> {
         }
         let following = place.prepare(particle::Parameters::phone())?.map(Following::keeping_all);
         let parameters = parameters.as_deref();
-        return Replay { file: &file, parameters, compare, following, output: &output, quiet }.run();
+        let fixes = fixes.as_deref();
+        return Replay { file: &file, parameters, compare, following, fixes, output: &output, quiet }.run();
     }
     let mut following = place.prepare(particle::Parameters::default())?.map(Following::keeping_all);
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -74,6 +81,11 @@ pub fn run(args: Args) -> Result<(), Error> {
         print(&format!("{again}\n"))?;
     }
     let folder = output.folder(&stem(&file));
+    let epoch = recording.metadata.get(BEGAN).and_then(|began| began.parse().ok());
+    let mut incoming = incoming(fixes.as_deref(), following.as_ref(), epoch, &smoother::Parameters::default(), quiet)?;
+    if let Some(following) = &mut following {
+        following.hearing(incoming.take());
+    }
     let recording = Report {
         title: recording.name.clone(),
         recording,
@@ -88,6 +100,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     if let Some(following) = following {
         finish_and_tell(following, Some(&recording), &folder, quiet)?;
     }
+    alone(incoming, &recording.steps, &folder, quiet)?;
     match again {
         Some(again) if !again.is_whole() => Err(Error::new(format!("computed again, the steps differ: {again}"))),
         _ => Ok(()),

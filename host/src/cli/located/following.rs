@@ -3,6 +3,7 @@
 use super::outputs::{Outputs, Wanted, walk};
 use super::{picture, summary};
 use crate::building::georeference::Projection;
+use crate::cli::fixes::Incoming;
 use crate::cli::{Error, print};
 use crate::export::{file, png};
 use crate::follow::{self, Follower, LONGEST_STEP_M, Said, Unusual, scene};
@@ -26,6 +27,8 @@ pub struct Following {
     lines: Option<String>,
     /// What viewers show, when it is kept for the recording.
     moments: Option<Vec<Moment>>,
+    /// Positions of other sources.
+    incoming: Option<Incoming>,
 }
 
 impl Following {
@@ -33,7 +36,7 @@ impl Following {
     pub fn new(follower: Follower, wanted: &Wanted) -> Result<Self, Error> {
         let projection = follower.building().georeference.projection()?;
         let outputs = wanted.open(projection.as_ref())?;
-        Ok(Self { follower, projection, outputs, unix_us: Vec::new(), lines: None, moments: None })
+        Ok(Self { follower, projection, outputs, unix_us: Vec::new(), lines: None, moments: None, incoming: None })
     }
 
     /// Keeps the lines, for [`Following::finish`] to write them into its folder, and what viewers show.
@@ -41,6 +44,11 @@ impl Following {
         self.lines = Some(String::new());
         self.moments = Some(Vec::new());
         self
+    }
+
+    /// Hears of positions of other sources too.
+    pub fn hearing(&mut self, incoming: Option<Incoming>) {
+        self.incoming = incoming;
     }
 
     /// What viewers show of it: the plan, and the moments that were kept.
@@ -56,6 +64,9 @@ impl Following {
     /// Follows a step, and hands on what is said, which is also the second answer, as JSON. `unix_us` is the date of its end, if that
     /// is known. **Units:** microseconds since the beginning of 1970.
     pub fn step(&mut self, step: &Step, unix_us: Option<i64>) -> (Said, Value) {
+        if let Some(incoming) = &mut self.incoming {
+            incoming.step(step, |observation| _ = self.follower.observe(observation));
+        }
         let said = self.follower.step(step);
         match said.unusual {
             Some(Unusual::TooLong(length)) => eprintln!(
@@ -103,7 +114,7 @@ impl Following {
 
     /// Writes the tracks that were asked for and, with a folder, the pictures of the floors; returns what there is to tell.
     pub fn finish(self, recording: Option<&Recording>, folder: Option<&Path>) -> Result<String, Error> {
-        let Self { follower, projection, outputs, unix_us, lines, .. } = self;
+        let Self { follower, projection, outputs, unix_us, lines, incoming, .. } = self;
         outputs.finish(&walk(&follower, &unix_us, projection.as_ref()))?;
         if follower.path().is_empty() {
             return Err(Error::new("there are no steps to follow in the building"));
@@ -115,6 +126,9 @@ impl Following {
         }
         let Some(folder) = folder else { return Ok(told) };
         file::folder(folder)?;
+        if let Some(incoming) = incoming {
+            told += &format!("\n{}", incoming.finish(folder)?);
+        }
         let mut files = Vec::new();
         if let Some(lines) = lines {
             file::write(&folder.join(STREAM), lines.as_bytes())?;
