@@ -44,8 +44,15 @@ pub const CXX: Tool = Tool { what: "a C++ compiler", present_by: &["c++"], packa
 /// Linker for the microcontroller, with the compiler above.
 pub const LLD: Tool = Tool { what: "the linker lld", present_by: &["ld.lld"], packages: &["lld"] };
 
+/// A graphics card in software, for the pictures of the window.
+pub const LAVAPIPE: Tool = Tool {
+    what: "a Vulkan driver in software",
+    present_by: &["/usr/share/vulkan/icd.d/lvp_icd.x86_64.json"],
+    packages: &["mesa-vulkan-drivers"],
+};
+
 /// Everything.
-pub const ALL: [Tool; 7] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD];
+pub const ALL: [Tool; 8] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD, LAVAPIPE];
 
 impl Tool {
     /// Whether the machine has it.

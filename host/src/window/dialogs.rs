@@ -60,6 +60,10 @@ impl Dialog {
     /// Asks for a recording.
     pub fn ask_recording(&mut self) {
         self.question = Some(Question::Recording);
+        // What was named may be a shoe.
+        if self.wanted.what.trim().parse::<Address>().is_ok() {
+            self.wanted.what.clear();
+        }
         let folder = PathBuf::from(self.wanted.what.trim());
         let folder =
             folder.parent().filter(|folder| folder.is_dir()).map_or_else(|| PathBuf::from("."), Path::to_owned);
@@ -69,6 +73,9 @@ impl Dialog {
     /// Asks for a shoe.
     pub fn ask_shoe(&mut self) {
         self.question = Some(Question::Shoe);
+        if self.wanted.what.trim().parse::<Address>().is_err() {
+            self.wanted.what.clear();
+        }
         let ports = serialport::available_ports().unwrap_or_default();
         self.ports = ports.into_iter().map(|port| format!("serial:{}", port.port_name)).collect();
         self.ports.push("tcp:127.0.0.1:7700".into());

@@ -1,0 +1,161 @@
+//! `sohle building graph` and `sohle route` from outside, and the graph of a real plan.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot run its program has failed")]
+
+use sohle::building::check::{Finding, Kind, Level, check};
+use sohle::building::geometry::{self, Segment};
+use sohle::building::open::{Options, open};
+use sohle::graph::Graph;
+use sohle::graph::draw::{self, draw};
+use sohle::graph::lint::{self, lint};
+use sohle::recording::recordings_dir;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn sohle(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sohle")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+#[track_caller]
+fn said(folder: &Path, arguments: &[&str]) -> String {
+    let output = sohle(folder, arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[track_caller]
+fn refused(folder: &Path, arguments: &[&str]) -> String {
+    let output = sohle(folder, arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), told.lines().count()), (Some(1), 1), "{told}");
+    told
+}
+
+fn house() -> tempfile::TempDir {
+    let home = tempfile::tempdir().unwrap();
+    said(home.path(), &["building", "generate", "twin", "twin.geojson"]);
+    home
+}
+
+#[test]
+fn a_graph_is_drawn_written_and_read_again() {
+    let home = house();
+    let folder = home.path();
+    let drawn =
+        ["building", "graph", "twin.geojson", "--write", "graph.geojson", "--list", "list.csv", "--out", "pictures"];
+    assert!(said(folder, &drawn).starts_with("walk graph, drawn"));
+    assert!(std::fs::read(folder.join("pictures/floor0.png")).unwrap().starts_with(b"\x89PNG"));
+    assert!(refused(folder, &drawn).contains("--force"));
+    // From the file, and from the list, it is the same.
+    assert!(
+        said(folder, &["building", "graph", "graph.geojson", "--list", "again.csv"])
+            .starts_with("walk graph, of the file")
+    );
+    let imported = ["building", "graph", "twin.geojson", "--import", "list.csv", "--list", "third.csv"];
+    assert!(said(folder, &imported).starts_with("walk graph, read from a list"));
+    let rows = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap().lines().count();
+    assert_eq!([rows("again.csv"), rows("third.csv")], [rows("list.csv"); 2]);
+    assert!(said(folder, &["building", "check", "graph.geojson"]).contains("0 errors"));
+}
+
+#[test]
+fn a_graph_through_a_wall_and_a_list_that_is_none_are_refused() {
+    let home = house();
+    let folder = home.path();
+    let headings =
+        "start_node,start_y_m,start_x_m,start_floor,end_node,end_y_m,end_x_m,end_floor,direction_deg,length_m";
+    let write = |rows: &str| std::fs::write(folder.join("list.csv"), format!("{headings}\n{rows}")).unwrap();
+    let import = ["building", "graph", "twin.geojson", "--import", "list.csv"];
+    write("0,1,3,0,1,6,3,0,90,5\n1,6,3,0,0,1,3,0,270,5\n");
+    let output = sohle(folder, &import);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8(output.stdout).unwrap().contains("leads through a wall"));
+    write("0,1,3,9,1,6,3,0,90,5\n");
+    assert!(refused(folder, &import).contains("list.csv, line 2: floor 9 is not there; the building has 0, 1"));
+    assert!(
+        refused(folder, &["building", "graph", "twin.geojson", "--import", "none.csv"])
+            .contains("none.csv cannot be read")
+    );
+    std::fs::write(folder.join("wrong.toml"), "edge_m = -1.0\n").unwrap();
+    let wrong = ["building", "graph", "twin.geojson", "--parameters", "wrong.toml"];
+    assert!(refused(folder, &wrong).contains("edge_m = -1: expected 0.5 to 50"));
+}
+
+#[test]
+fn a_route_is_told_and_drawn() {
+    let home = house();
+    let folder = home.path();
+    let told =
+        said(folder, &["route", "W01", "E14", "--building", "twin.geojson", "--avoid", "elevators", "--out", "way"]);
+    assert!(told.starts_with("  1. leave from W01 towards north"), "{told}");
+    assert!(told.contains("take the stairs (stairs-") && told.contains("up to floor 1"), "{told}");
+    assert!(told.contains("arrive at E14"), "{told}");
+    assert!(folder.join("way/floor0.png").is_file() && folder.join("way/floor1.svg").is_file());
+    let nowhere = refused(folder, &["route", "W01", "cellar", "--building", "twin.geojson"]);
+    assert!(nowhere.contains("'cellar' is no room and no entrance of the building"), "{nowhere}");
+}
+
+#[test]
+fn a_recorded_walk_is_followed_and_each_step_is_explained() {
+    let Some(folder) = recordings_dir().map(|folder| folder.join("hcu_hamburg")).filter(|folder| folder.exists())
+    else {
+        return;
+    };
+    let home = tempfile::tempdir().unwrap();
+    let [walk, plan] = ["eight_walk", "floorplans/4OG.geojson"].map(|name| folder.join(name).display().to_string());
+    let begin = ["graph", &walk, "--building", &plan, "--start"];
+    let told = said(home.path(), &[&begin[..], &["4,76.7,33.4,-164", "--explain", "--out", "way"]].concat());
+    let lines: Vec<&str> = told.lines().filter(|line| line.starts_with("step ")).collect();
+    // 146 m in steps of about 0.7 m.
+    assert!((180..=240).contains(&lines.len()), "{}", lines.len());
+    assert!(lines.iter().all(|line| line.contains(", delta ") && line.contains(": edge ")), "{}", lines[0]);
+    for case in ["case 1 straight on", "case 3 turn", "case 4 beyond the node"] {
+        assert!(lines.iter().any(|line| line.contains(case)), "{case}");
+    }
+    assert!(told.contains("edges chosen without a search") && told.contains("on floor 4"), "{told}");
+    assert!(home.path().join("way/floor4.png").is_file());
+    assert!(refused(home.path(), &[&begin[..], &["anywhere"]].concat()).contains("expected FLOOR,X,Y,HEADING_DEG"));
+}
+
+#[test]
+fn the_rooms_of_the_university_are_reached_and_no_edge_leads_through_a_wall() {
+    let Some(folder) =
+        recordings_dir().map(|folder| folder.join("hcu_hamburg/floorplans")).filter(|folder| folder.exists())
+    else {
+        return;
+    };
+    let mut building = open(&folder, &Options::default()).unwrap();
+    building.graph = Some(draw(&building, &draw::Parameters::default()));
+    let building = building.assembled().unwrap();
+    let found = lint(&building, &lint::Parameters::default()).unwrap();
+    let errors = found.iter().filter(|finding| finding.level == Level::Error);
+    let errors: Vec<_> = errors.filter(|finding| finding.kind != Kind::SeparatePiece).collect();
+    assert!(errors.iter().all(|finding| finding.kind == Kind::RoomOffGraph), "{errors:#?}");
+    // Shafts to which no way leads at all are told by the check of the building, too. Of some 400 rooms five more have a door
+    // that the graph does not lead through.
+    let place = |finding: &Finding| (finding.floor, finding.room.clone());
+    let plan = check(&building);
+    let closed: Vec<_> = plan.iter().filter(|finding| finding.kind == Kind::UnreachableRoom).map(place).collect();
+    let off: Vec<_> = errors.iter().map(|finding| place(finding)).filter(|room| !closed.contains(room)).collect();
+    assert!(off.len() <= 5, "{off:?}");
+    // Walls once more without the lint's own means.
+    let graph = Graph::of(&building).unwrap();
+    for floor in &building.floors {
+        let edges = graph.edge_ids().filter(|&id| {
+            let [from, to] = [graph.edge(id).from, graph.edge(id).to].map(|node| graph.node(node));
+            from.floor == floor.number && from.height_m == floor.height_m && to.height_m == floor.height_m
+        });
+        let lines: Vec<Segment> = edges.map(|id| graph.ends(id)).collect();
+        assert!(!lines.is_empty());
+        let low = |line: &Segment| line[0][0].min(line[1][0]);
+        let mut lines = lines;
+        lines.sort_by(|a, b| low(a).total_cmp(&low(b)));
+        for wall in &floor.walls {
+            // Edges are no longer than 8 m: only those that begin near the wall are looked at.
+            let begin = lines.partition_point(|line| low(line) < low(wall) - 8.0);
+            let right = wall[0][0].max(wall[1][0]);
+            let mut near = lines[begin..].iter().take_while(|line| low(line) <= right);
+            assert!(near.all(|line| geometry::crossing(line, wall).is_none()), "{wall:?}");
+        }
+    }
+}
