@@ -92,6 +92,21 @@ fn count(picture: &Picture, rgb: Rgb) -> usize {
 }
 
 #[test]
+fn a_building_that_is_opened_later_comes_whole_into_view() {
+    let Some(mut studio) = studio() else { return };
+    let (view, nothing) = (View::default(), Overlay::default());
+    let expected = picture(&mut studio, SHEET, &view, &nothing);
+    let mut map = Map::new(studio.render());
+    let mut view = view;
+    let mut last = None;
+    for scene in [Scene::open_ground(), Scene::of(&building("institute"))] {
+        let scene = Arc::new(scene);
+        last = Some(studio.picture(SHEET, |ui| drop(map.show(ui, &mut view, &scene, &nothing))).unwrap());
+    }
+    assert!(last.unwrap().pixels == expected.pixels);
+}
+
+#[test]
 fn particles_and_paths_are_drawn_and_can_be_left_out() {
     let Some(mut studio) = studio() else { return };
     for projection in [Projection::Orbit, Projection::Flat] {

@@ -24,7 +24,7 @@ sohle window tcp:127.0.0.1:7700 --building buildings/twin.geojson\n  \
 sohle window walk.mcap --picture window.png --at 30"
 )]
 pub struct Args {
-    /// A recording, or a shoe as serial:PATH[@BAUD] or tcp:HOST:PORT
+    /// A recording, or a shoe as tcp:HOST:PORT or serial:PATH, which may be followed by @BAUD
     #[arg(value_name = "FILE|LINK")]
     what: Option<String>,
     /// Follows the steps through this building: any format that 'sohle building show' takes

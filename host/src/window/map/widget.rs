@@ -8,6 +8,7 @@ use super::ruler::Ruler;
 use super::scene::{Place, Scene};
 use super::view::{SPREAD, View};
 use super::{controls, gauges, keys, lettering, pins, pointer};
+use crate::building::Point;
 use crate::window::gpu::RenderState;
 use eframe::egui::{self, Color32, Rect, Sense, Ui, WidgetInfo, WidgetType, pos2};
 use std::sync::Arc;
@@ -41,6 +42,8 @@ pub struct Map {
     painter: Painter,
     /// Where the camera is going.
     goal: Option<Camera>,
+    /// Bounds of what was shown last.
+    shown: Option<[Point; 2]>,
     /// What is measured.
     ruler: Ruler,
     /// The cluster whose details are shown, and where it was when it was clicked.
@@ -79,7 +82,7 @@ impl Scenery<'_> {
 impl Map {
     /// A map that draws with this.
     pub fn new(render: &RenderState) -> Self {
-        Self { painter: Painter::new(render), goal: None, ruler: Ruler::default(), picked: None }
+        Self { painter: Painter::new(render), goal: None, shown: None, ruler: Ruler::default(), picked: None }
     }
 
     /// Shows all of the building, or all of the walk where there is none.
@@ -123,6 +126,11 @@ impl Map {
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, format!("Map of {name}")));
         if rect.width() < 8.0 || rect.height() < 8.0 {
             return Response::default();
+        }
+        // Where somebody looked in one building says nothing of another.
+        let bounds = scene.bounds();
+        if self.shown.replace(bounds).is_some_and(|before| before != bounds) {
+            (view.camera, self.goal) = (None, None);
         }
         let camera = match view.camera {
             Some(camera) => camera.bounded(),
