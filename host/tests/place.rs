@@ -11,7 +11,13 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn sohle(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sohle")).args(arguments).current_dir(folder).output().expect("it starts")
+    Command::new(env!("CARGO_BIN_EXE_sohle"))
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("it starts")
 }
 
 /// Runs a command that must succeed; what it says.

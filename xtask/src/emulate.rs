@@ -192,8 +192,9 @@ pub fn check() -> Result<(), Failure> {
         if summary.frames_bad > 0 || summary.steps == 0 {
             return Err(Failure::Found(format!("{name}: {} steps, {} bad frames", summary.steps, summary.frames_bad)));
         }
-        let again =
-            process::read(Command::new(&sohle).arg("replay").arg(&live).arg("--out").arg(folder.join("again")))?;
+        let again = process::read(
+            Command::new(&sohle).args(["replay", "--headless"]).arg(&live).arg("--out").arg(folder.join("again")),
+        )?;
         let told = again.out.lines().find(|line| line.contains("bit for bit"));
         println!("  {}", told.ok_or_else(|| Failure::Found(format!("{name}: nothing was computed again")))?);
     }

@@ -2,7 +2,7 @@
 
 use super::located::{Following, How, finish_and_tell};
 use super::report::{Report, Settings};
-use super::{Error, Output, progress, report};
+use super::{Error, Output, progress, report, shown, window};
 use crate::building::open::{Options, open};
 use crate::building::{Building, geojson, route};
 use crate::export::file;
@@ -16,12 +16,12 @@ use std::path::PathBuf;
 #[command(
     after_help = "Writes the floors with the walk on them (floor0.png, floor1.png, as SVG too), places.jsonl, the track by\n\
 itself (track.svg, track.png, track.geojson, steps.csv, parameters.toml; the last two also for the documented\n\
-settings) and recording.mcap. Needs no network and no display.\n\n\
+settings) and recording.mcap; then the window shows the walk, where there is a display. Needs no network.\n\n\
 Examples:\n  sohle demo\n  sohle demo --seed 7 --out /tmp/walk\n  sohle demo --start W02 --track walk.geojson\n  \
 sohle demo --building buildings/large.geojson --route 'F0/101,stairs,F1/101'\n  sohle demo --no-building"
 )]
 pub struct Args {
-    /// Opens no window. There is no window yet: today this changes nothing
+    /// Opens no window at the end; without a display there is none anyway
     #[arg(long)]
     pub headless: bool,
     /// Seed of the walker's and the sensor's chance; the same seed gives the same files
@@ -90,7 +90,12 @@ pub fn run(args: Args) -> Result<(), Error> {
         quiet,
     };
     let recording = report.run()?;
-    following.map_or(Ok(()), |following: Following| finish_and_tell(following, Some(&recording), &folder, quiet))
+    let walk = shown::Walk::of(path, following.as_ref());
+    following.map_or(Ok(()), |following: Following| finish_and_tell(following, Some(&recording), &folder, quiet))?;
+    if window::is_wanted(args.headless, quiet) {
+        window::show(walk);
+    }
+    Ok(())
 }
 
 /// The building to walk in.

@@ -24,6 +24,7 @@ mod phone;
 pub mod replay;
 pub mod report;
 pub mod route;
+pub mod shown;
 pub mod simulate;
 mod suite;
 pub mod table;

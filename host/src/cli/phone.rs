@@ -7,7 +7,6 @@ use crate::export::picture::{Line, Picture, Placement, Role};
 use crate::export::{self, Named};
 use crate::fixes::smoother;
 use crate::phone::{self, Parameters};
-use crate::toml_file;
 use crate::track::Track;
 use std::path::Path;
 
@@ -15,8 +14,8 @@ use std::path::Path;
 pub struct Replay<'a> {
     /// The recording.
     pub file: &'a Path,
-    /// Settings of the steps; others keep their default.
-    pub parameters: Option<&'a Path>,
+    /// Settings of the steps.
+    pub parameters: Parameters,
     /// Also with the step length of the source document.
     pub compare: bool,
     /// Who is followed, if there is a building.
@@ -33,11 +32,7 @@ impl Replay<'_> {
     /// Reads, finds the steps, tells and writes.
     pub fn run(self) -> Result<(), Error> {
         let recording = phone::open::open(self.file)?;
-        let chosen = match self.parameters {
-            Some(path) => toml_file::read("settings of the steps of a phone", path)?,
-            None => Parameters::default(),
-        };
-        let mut settings = vec![(Role::Chosen, "default", chosen)];
+        let mut settings = vec![(Role::Chosen, "default", self.parameters)];
         if self.compare {
             settings.push((Role::Documented, "documented", Parameters::documented()));
         }

@@ -4,19 +4,20 @@ use super::fixes::{alone, incoming};
 use super::located::{Following, InBuilding, finish_and_tell};
 use super::phone::Replay;
 use super::report::{Report, Settings};
-use super::{Error, Output, convert, parameters, print};
+use super::{Error, Output, convert, parameters, print, shown, window};
 use crate::calibration;
 use crate::fixes::smoother;
 use crate::recording::live::BEGAN;
 use crate::recording::{self, Profile};
-use crate::{particle, phone};
+use crate::{particle, phone, toml_file};
 use std::path::PathBuf;
 
 /// Tracks a recorded walk
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Writes track.svg, track.png, track.geojson, steps.csv, parameters.toml and recording.mcap. A recording\n\
-that holds its truth (of 'sohle demo' or 'sohle simulate') is judged by it.\n\n\
+that holds its truth (of 'sohle demo' or 'sohle simulate') is judged by it. Then the window shows the walk, where there\n\
+is a display.\n\n\
 Examples:\n  sohle replay walk.csv --compare\n  sohle replay sohle-out/demo/recording.mcap --out again\n  \
 sohle replay walk.mcap --parameters mine.toml --origin 48.2087,16.3726,35\n  \
 sohle replay walk.mcap --building buildings/twin.geojson --start entrances --fixes positions.jsonl"
@@ -39,6 +40,9 @@ pub struct Args {
     /// Positions and ranges of other sources, a JSON object to a line (docs/fixes.md); '-' is the standard input
     #[arg(long, value_name = "FILE|-")]
     fixes: Option<PathBuf>,
+    /// Opens no window at the end; without a display there is none anyway
+    #[arg(long)]
+    headless: bool,
     #[command(flatten)]
     place: InBuilding,
     #[command(flatten)]
@@ -47,7 +51,7 @@ pub struct Args {
 
 /// Reads, tracks, tells and writes.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args { file, profile, parameters, calibration, compare, fixes, place, output } = args;
+    let Args { file, profile, parameters, calibration, compare, fixes, headless, place, output } = args;
     let quiet = output.quiet || place.how.wanted.takes_stdout();
     if phone::open::is_phone(&file) {
         let useless = [("--profile", profile.is_some()), ("--calibration", calibration.is_some())];
@@ -58,9 +62,17 @@ pub fn run(args: Args) -> Result<(), Error> {
             )));
         }
         let following = place.prepare(particle::Parameters::phone())?.map(Following::keeping_all);
-        let parameters = parameters.as_deref();
+        let chosen: phone::Parameters = match &parameters {
+            Some(path) => toml_file::read("settings of the steps of a phone", path)?,
+            None => phone::Parameters::default(),
+        };
+        let walk = shown::Walk { phone: chosen.clone(), ..shown::Walk::of(file.clone(), following.as_ref()) };
         let fixes = fixes.as_deref();
-        return Replay { file: &file, parameters, compare, following, fixes, output: &output, quiet }.run();
+        Replay { file: &file, parameters: chosen, compare, following, fixes, output: &output, quiet }.run()?;
+        if window::is_wanted(headless, quiet) {
+            window::show(walk);
+        }
+        return Ok(());
     }
     let mut following = place.prepare(particle::Parameters::default())?.map(Following::keeping_all);
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -86,6 +98,12 @@ pub fn run(args: Args) -> Result<(), Error> {
     if let Some(following) = &mut following {
         following.hearing(incoming.take());
     }
+    let walk = shown::Walk {
+        profile,
+        tracker: settings.first().map(|settings| settings.parameters).unwrap_or_default(),
+        calibration: calibration.clone(),
+        ..shown::Walk::of(file, following.as_ref())
+    };
     let recording = Report {
         title: recording.name.clone(),
         recording,
@@ -101,6 +119,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         finish_and_tell(following, Some(&recording), &folder, quiet)?;
     }
     alone(incoming, &recording.steps, &folder, quiet)?;
+    if window::is_wanted(headless, quiet) {
+        window::show(walk);
+    }
     match again {
         Some(again) if !again.is_whole() => Err(Error::new(format!("computed again, the steps differ: {again}"))),
         _ => Ok(()),

@@ -1,23 +1,23 @@
 //! The window itself: it shows the latest snapshot, and hands on what is asked for. It computes nothing.
 
 use super::dialogs::{Dialog, Wanted};
-use super::engine::{Command, Engine, Kind, Opening, Snapshot};
+use super::engine::{Command, Kind, Make, Opening, Snapshot};
 use super::gpu::RenderState;
 use super::help;
-use super::latencies::Latencies;
 use super::layout::{Layout, Look, View};
-use super::map::{Map, Scene};
+use super::map::{Map, Overlay, Scene};
 use super::parameters::Editor;
+use super::shoes::Shoes;
 use super::{plots, saving, selector, status, toolbar};
-use eframe::egui::{self, CentralPanel, Context, Panel, ThemePreference, Ui, WidgetText};
+use eframe::egui::{self, CentralPanel, Context, Panel, ThemePreference, Ui, ViewportCommand, WidgetText};
 use egui_dock::{DockArea, Style, TabViewer};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// All that the window keeps.
 pub struct App {
-    engine: Option<Engine>,
-    snapshot: Arc<Snapshot>,
+    shoes: Shoes,
     /// Where there is nothing to draw with, the map is missing.
     map: Option<Map>,
     ground: Arc<Scene>,
@@ -27,9 +27,10 @@ pub struct App {
     editor: Editor,
     help: bool,
     told: String,
-    latencies: Latencies,
     /// What was opened last.
     opening: Option<Opening>,
+    /// How long the last frame took, where that is measured.
+    frame: Option<Duration>,
 }
 
 impl App {
@@ -41,8 +42,7 @@ impl App {
             None => (Layout::default(), String::new()),
         };
         Self {
-            engine: None,
-            snapshot: Arc::default(),
+            shoes: Shoes::default(),
             map: render.map(Map::new),
             ground: Arc::new(Scene::open_ground()),
             layout,
@@ -51,28 +51,41 @@ impl App {
             editor: Editor::default(),
             help: false,
             told,
-            latencies: Latencies::default(),
             opening: None,
+            frame: None,
         }
     }
 
-    /// Opens something in the place of what was open.
-    pub fn open(&mut self, opening: Opening, context: &Context) {
+    /// Opens something in the place of what is selected, or beside all that is open.
+    pub fn open(&mut self, opening: Opening, context: &Context, beside: bool) {
         self.dialog.suggest(Wanted {
             what: opening.what.to_string(),
-            building: opening.building.as_ref().map(|path| path.display().to_string()).unwrap_or_default(),
+            building: opening.building.as_ref().map(ToString::to_string).unwrap_or_default(),
             start: opening.settings.follow.start.clone(),
+            beside,
         });
-        let context = context.clone();
         self.opening = Some(opening.clone());
-        self.latencies = Latencies::default();
-        self.snapshot = Arc::default();
-        self.engine = Some(Engine::start(opening, move || context.request_repaint()));
+        self.begin(opening.name(), Box::new(move || opening.open()), context, beside);
     }
 
-    /// What is shown.
+    /// Shows something of this name that somebody else makes.
+    pub fn begin(&mut self, name: String, make: Make, context: &Context, beside: bool) {
+        self.shoes.open(name, make, context, beside);
+    }
+
+    /// What is shown of the selected one.
     pub fn snapshot(&self) -> &Snapshot {
-        &self.snapshot
+        self.shoes.snapshot()
+    }
+
+    /// All that is open.
+    pub fn shoes(&mut self) -> &mut Shoes {
+        &mut self.shoes
+    }
+
+    /// How long the last frame took, until all of it was drawn.
+    pub fn took(&mut self, frame: Duration) {
+        self.frame = Some(frame);
     }
 
     /// How it is laid out.
@@ -82,21 +95,18 @@ impl App {
 
     /// Asks the engine for something.
     pub fn ask(&self, command: Command) {
-        if let Some(engine) = &self.engine {
-            engine.ask(command);
-        }
+        self.shoes.ask(command);
     }
 
     /// From steps to pictures, so far.
     pub fn latency(&self) -> Option<status::Latency> {
-        self.latencies.told()
+        self.shoes.latency()
     }
 
     /// Draws the window.
     pub fn show(&mut self, ui: &mut Ui) {
-        if let Some(snapshot) = self.engine.as_ref().and_then(Engine::take) {
-            self.latencies.arrived(snapshot.stepped);
-            self.snapshot = snapshot;
+        if self.shoes.look(self.frame.take()) {
+            ui.ctx().send_viewport_cmd(ViewportCommand::Close);
         }
         ui.ctx().set_theme(match self.layout.look {
             Look::System => ThemePreference::System,
@@ -104,7 +114,7 @@ impl App {
             Look::Dark => ThemePreference::Dark,
         });
         let mut commands = Vec::new();
-        let snapshot = self.snapshot.clone();
+        let snapshot = self.shoes.snapshot().clone();
         let asked = Panel::top("toolbar").show(ui, |ui| toolbar::show(ui, &snapshot, &mut commands)).inner;
         Panel::bottom("bar").show(ui, |ui| {
             ui.add_space(2.0);
@@ -112,7 +122,9 @@ impl App {
             ui.add_space(2.0);
         });
         if self.layout.selector {
-            Panel::left("views").default_size(140.0).show(ui, |ui| selector::show(ui, &mut self.layout));
+            Panel::left("views")
+                .default_size(140.0)
+                .show(ui, |ui| selector::show(ui, &mut self.layout, &mut self.shoes));
         }
         CentralPanel::no_frame().show(ui, |ui| self.views(ui, &snapshot, &mut commands));
         for asked in asked {
@@ -124,7 +136,7 @@ impl App {
         help::show(ui, &mut self.help);
         if let Some(wanted) = self.dialog.show(ui) {
             let opening = wanted.opening(self.opening.as_ref());
-            self.open(opening, ui.ctx());
+            self.open(opening, ui.ctx(), wanted.beside);
         }
         if let Some(told) = saving::screenshot(ui.ctx()) {
             self.told = told;
@@ -132,34 +144,39 @@ impl App {
         for command in commands {
             self.ask(command);
         }
-        self.latencies.painted();
     }
 
     fn views(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) {
         let Layout { map: map_view, cube, plots, dock, .. } = &mut self.layout;
+        let drawing = self.shoes.drawing();
         let mut views = Views {
             snapshot,
+            drawing: &drawing,
+            person: None,
             map: self.map.as_mut(),
             ground: &self.ground,
             map_view,
             cube,
             plots,
             editor: &mut self.editor,
-            latency: self.latencies.told(),
+            latency: self.shoes.latency(),
             commands,
         };
         let style = Style::from_egui(ui.style().as_ref());
         DockArea::new(dock).style(style).show_inside(ui, &mut views);
+        if let Some(person) = views.person {
+            self.shoes.select_person(person);
+        }
     }
 
     fn obey(&mut self, ui: &Ui, asked: toolbar::Asked, commands: &mut Vec<Command>) {
         match asked {
-            toolbar::Asked::Open => self.dialog.ask_recording(),
-            toolbar::Asked::Connect => self.dialog.ask_shoe(),
+            toolbar::Asked::Open => self.dialog.ask_recording(self.shoes.count()),
+            toolbar::Asked::Connect => self.dialog.ask_shoe(self.shoes.count()),
             toolbar::Asked::Picture => saving::ask_screenshot(ui.ctx()),
             toolbar::Asked::Track => commands.push(Command::Export(saving::name("sohle-track", "geojson"))),
             toolbar::Asked::Record => {
-                let recording = self.snapshot.link.as_ref().is_some_and(|link| link.recording.is_some());
+                let recording = self.snapshot().link.as_ref().is_some_and(|link| link.recording.is_some());
                 commands.push(Command::Record((!recording).then(|| saving::name("sohle-live", "mcap"))));
             }
             toolbar::Asked::Selector => self.layout.selector = !self.layout.selector,
@@ -171,32 +188,31 @@ impl App {
     }
 
     fn key(&mut self, asked: help::Asked, commands: &mut Vec<Command>) {
-        let [first, last] = self.snapshot.span;
+        let [first, last] = self.snapshot().span;
         let command = match asked {
             help::Asked::Help => return self.help = !self.help,
-            help::Asked::Open => return self.dialog.ask_recording(),
-            help::Asked::Connect => return self.dialog.ask_shoe(),
-            help::Asked::Play => Command::Play(!self.snapshot.pace.playing),
+            help::Asked::Open => return self.dialog.ask_recording(self.shoes.count()),
+            help::Asked::Connect => return self.dialog.ask_shoe(self.shoes.count()),
+            help::Asked::Play => Command::Play(!self.snapshot().pace.playing),
             help::Asked::Ahead => Command::StepAhead,
             help::Asked::Back => Command::StepBack,
             help::Asked::Home => Command::Jump(first),
             help::Asked::End => Command::Jump(last),
         };
-        if self.snapshot.kind == Kind::Replay {
+        if self.snapshot().kind == Kind::Replay {
             commands.push(command);
         }
     }
 }
 
 impl eframe::App for App {
-    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+        self.frame = frame.info().cpu_usage.map(Duration::from_secs_f32);
         self.show(ui);
     }
 
     fn on_exit(&mut self) {
-        if let Some(engine) = self.engine.take() {
-            engine.finish();
-        }
+        self.shoes.finish();
         if let Some(file) = &self.file
             && let Err(error) = self.layout.write(file)
         {
@@ -208,6 +224,9 @@ impl eframe::App for App {
 /// What the views need.
 struct Views<'a> {
     snapshot: &'a Snapshot,
+    drawing: &'a (Option<Arc<Scene>>, Overlay),
+    /// Who was clicked on the map.
+    person: Option<usize>,
     map: Option<&'a mut Map>,
     ground: &'a Arc<Scene>,
     map_view: &'a mut super::map::View,
@@ -224,8 +243,9 @@ impl Views<'_> {
             ui.label("There is nothing to draw the map with: no graphics card, and no software in its place.");
             return;
         };
-        let scene = self.snapshot.scene.as_ref().unwrap_or(self.ground);
-        let told = map.show(ui, self.map_view, scene, &self.snapshot.overlay);
+        let (scene, overlay) = self.drawing;
+        let told = map.show(ui, self.map_view, scene.as_ref().unwrap_or(self.ground), overlay);
+        self.person = told.selected;
         let place = told.clicked.filter(|_| self.snapshot.whereabouts.is_some());
         if let Some(place) = place {
             let [x, y] = place.point;

@@ -1,6 +1,6 @@
 //! What is asked before something is opened.
 
-use super::engine::{Opening, What};
+use super::engine::{Opening, Plan, What};
 use crate::follow;
 use crate::link::Address;
 use eframe::egui::{self, RichText, TextEdit, Ui};
@@ -15,6 +15,8 @@ pub struct Wanted {
     pub building: String,
     /// Where the walk begins, or nothing.
     pub start: String,
+    /// Beside what is open, not in its place.
+    pub beside: bool,
 }
 
 impl Wanted {
@@ -29,7 +31,9 @@ impl Wanted {
         if let Some(before) = before {
             opening.settings = before.settings.clone();
         }
-        opening.building = text(&self.building).map(PathBuf::from);
+        // One that was read, and has no file, keeps its name in the field until another is wanted.
+        let same = before.and_then(|before| before.building.clone()).filter(|plan| plan.to_string() == self.building);
+        opening.building = same.or_else(|| text(&self.building).map(|path| Plan::File(path.into())));
         opening.settings.follow.start = text(&self.start).unwrap_or(follow::Settings::default().start);
         opening
     }
@@ -51,6 +55,8 @@ pub struct Dialog {
     folder: PathBuf,
     files: Vec<PathBuf>,
     ports: Vec<String>,
+    /// How many are open.
+    open: usize,
 }
 
 /// Files that may be recordings.
@@ -58,7 +64,10 @@ const RECORDINGS: [&str; 6] = ["mcap", "csv", "txt", "mat", "tsv", "dat"];
 
 impl Dialog {
     /// Asks for a recording.
-    pub fn ask_recording(&mut self) {
+    ///
+    /// `open` is how many are open.
+    pub fn ask_recording(&mut self, open: usize) {
+        self.open = open;
         self.question = Some(Question::Recording);
         // What was named may be a shoe.
         if self.wanted.what.trim().parse::<Address>().is_ok() {
@@ -71,7 +80,10 @@ impl Dialog {
     }
 
     /// Asks for a shoe.
-    pub fn ask_shoe(&mut self) {
+    ///
+    /// `open` is how many are open.
+    pub fn ask_shoe(&mut self, open: usize) {
+        self.open = open;
         self.question = Some(Question::Shoe);
         if self.wanted.what.trim().parse::<Address>().is_err() {
             self.wanted.what.clear();
@@ -115,6 +127,10 @@ impl Dialog {
             let building = "none: the steps alone";
             field(ui, "Building", &mut self.wanted.building, building);
             field(ui, "Start", &mut self.wanted.start, "anywhere; entrances, a room, or FLOOR,X,Y[,HEADING_DEG]");
+            if self.open > 0 {
+                let told = "Shows it with its own colour, not in the place of the selected one";
+                ui.checkbox(&mut self.wanted.beside, "Beside what is open").on_hover_text(told);
+            }
             let address = self.wanted.what.trim().parse::<Address>();
             let fault = match question {
                 Question::Recording if self.wanted.what.trim().is_empty() => Some("no file is named".to_owned()),

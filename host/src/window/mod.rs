@@ -13,12 +13,14 @@ mod help;
 mod latencies;
 pub mod layout;
 pub mod map;
+pub mod measure;
 mod parameters;
 pub mod picture;
 mod plots;
 pub mod run;
 pub mod saving;
 mod selector;
+pub mod shoes;
 pub mod status;
 mod toolbar;
 

@@ -25,8 +25,8 @@ pub enum Error {
 /// What is to be seen.
 #[derive(Clone, Debug)]
 pub struct Wanted {
-    /// What is open.
-    pub opening: Option<Opening>,
+    /// What is open; the first is selected.
+    pub openings: Vec<Opening>,
     /// How it is laid out.
     pub layout: Option<PathBuf>,
     /// The time after the beginning of a recording; its end where there is none. For a shoe, how long it is listened to.
@@ -48,38 +48,42 @@ const PAUSE: Duration = Duration::from_millis(20);
 /// # Errors
 /// When nothing can draw, or the recording cannot be read.
 pub fn draw(wanted: Wanted) -> Result<Picture, Error> {
-    let Wanted { opening, layout, at, views, sheet } = wanted;
+    let Wanted { openings, layout, at, views, sheet } = wanted;
     let mut studio = Studio::new()?;
     let mut app = App::new(Some(studio.render()), layout);
     app.layout().look = if sheet.dark { Look::Dark } else { Look::Light };
     views.into_iter().for_each(|view| app.layout().open(view));
     let begun = Instant::now();
-    let mut opening = opening;
-    let waits = opening.is_some();
-    let (mut asked, mut settled) = (false, 0);
-    while waits && settled < 3 {
+    let mut asked = vec![false; openings.len()];
+    let mut openings = openings.into_iter();
+    let mut settled = 0;
+    while !asked.is_empty() && settled < 3 {
         studio.frame(sheet, |ui| {
-            if let Some(opening) = opening.take() {
-                app.open(opening, ui.ctx());
+            for (index, opening) in openings.by_ref().enumerate() {
+                app.open(opening, ui.ctx(), index > 0);
             }
+            app.shoes().select(0);
             app.show(ui);
         })?;
-        let snapshot = app.snapshot();
-        if let (Kind::Nothing, Some(fault)) = (snapshot.kind, &snapshot.fault) {
-            return Err(Error::Opening(fault.clone()));
-        }
-        let there = match snapshot.kind {
-            Kind::Nothing | Kind::Opening => false,
-            Kind::Live => begun.elapsed().as_secs_f64() >= at.unwrap_or(5.0),
-            Kind::Replay if !asked => {
-                asked = true;
-                let [first, last] = snapshot.span;
-                app.ask(Command::Play(false));
-                app.ask(Command::Jump(at.map_or(last, |at| first + at)));
-                false
+        let mut there = true;
+        for (index, asked) in asked.iter_mut().enumerate() {
+            let Some(snapshot) = app.shoes().get(index).cloned() else { continue };
+            if let (Kind::Nothing, Some(fault)) = (snapshot.kind, &snapshot.fault) {
+                return Err(Error::Opening(fault.clone()));
             }
-            Kind::Replay => snapshot.computing.is_none() && !snapshot.pace.playing,
-        };
+            there &= match snapshot.kind {
+                Kind::Nothing | Kind::Opening => false,
+                Kind::Live => begun.elapsed().as_secs_f64() >= at.unwrap_or(5.0),
+                Kind::Replay if !*asked => {
+                    *asked = true;
+                    let [first, last] = snapshot.span;
+                    app.shoes().ask_one(index, Command::Play(false));
+                    app.shoes().ask_one(index, Command::Jump(at.map_or(last, |at| first + at)));
+                    false
+                }
+                Kind::Replay => snapshot.computing.is_none() && !snapshot.pace.playing,
+            };
+        }
         settled = if there { settled + 1 } else { 0 };
         if begun.elapsed() > PATIENCE {
             return Err(Error::Late(PATIENCE.as_secs()));

@@ -1,7 +1,7 @@
 //! The window on a display.
 
 use super::App;
-use super::engine::Opening;
+use super::engine::{Make, Opening};
 use eframe::egui::{ViewportBuilder, ViewportCommand};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -27,11 +27,19 @@ pub fn has_display() -> bool {
     !cfg!(all(unix, not(target_os = "macos"))) || set("WAYLAND_DISPLAY") || set("DISPLAY")
 }
 
+/// What the window shows at first.
+pub enum First {
+    /// Something that it opens.
+    Opening(Box<Opening>),
+    /// Something of this name that somebody else makes.
+    Made(String, Make),
+}
+
 /// Opens the window and returns when it is closed, or after so long.
 ///
 /// # Errors
 /// When there is no display, or it cannot be used.
-pub fn window(opening: Option<Opening>, layout: Option<PathBuf>, duration: Option<Duration>) -> Result<(), Error> {
+pub fn window(first: Vec<First>, layout: Option<PathBuf>, duration: Option<Duration>) -> Result<(), Error> {
     if !has_display() {
         return Err(Error::NoDisplay);
     }
@@ -43,9 +51,13 @@ pub fn window(opening: Option<Opening>, layout: Option<PathBuf>, duration: Optio
         options,
         Box::new(move |creation| {
             let mut app = App::new(creation.wgpu_render_state.as_ref(), layout);
-            if let Some(opening) = opening {
-                app.open(opening, &creation.egui_ctx);
+            for (index, first) in first.into_iter().enumerate() {
+                match first {
+                    First::Opening(opening) => app.open(*opening, &creation.egui_ctx, index > 0),
+                    First::Made(name, make) => app.begin(name, make, &creation.egui_ctx, index > 0),
+                }
             }
+            app.shoes().select(0);
             if let Some(duration) = duration {
                 let context = creation.egui_ctx.clone();
                 std::thread::spawn(move || {

@@ -1,10 +1,11 @@
-//! The list of views: which are there, and which are open.
+//! The lists: of what is open, and of the views.
 
 use super::layout::{Layout, Plot, View};
+use super::shoes::Shoes;
 use eframe::egui::{self, Ui};
 
 /// Shows it. A click opens a view or brings it to the front.
-pub fn show(ui: &mut Ui, layout: &mut Layout) {
+pub fn show(ui: &mut Ui, layout: &mut Layout, shoes: &mut Shoes) {
     ui.add_space(4.0);
     let mut wanted = None;
     let entry = |ui: &mut Ui, layout: &Layout, view: View, wanted: &mut Option<View>| {
@@ -14,6 +15,9 @@ pub fn show(ui: &mut Ui, layout: &mut Layout) {
         }
     };
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        if shoes.count() > 0 {
+            egui::CollapsingHeader::new("Shoes").default_open(true).show(ui, |ui| shoes.list(ui));
+        }
         egui::CollapsingHeader::new("Views").default_open(true).show(ui, |ui| {
             for view in [View::Map, View::Attitude, View::Status, View::Parameters] {
                 entry(ui, layout, view, &mut wanted);

@@ -100,6 +100,8 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, latency: Option<Latency>) {
 /// From the arrival of steps to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Latency {
+    /// Steps that were measured.
+    pub steps: usize,
     /// The half takes no longer. **Units:** ms.
     pub median_ms: f64,
     /// Of a hundred, 99 take no longer. **Units:** ms.

@@ -1,6 +1,6 @@
 //! Every control of the window, as those know it who cannot see it, and the window as a whole.
 
-use super::engine::{Kind, Opening, What};
+use super::engine::{Kind, Opening, Plan, What};
 use super::gpu::offscreen::{self, Sheet};
 use super::layout::{Layout, View};
 use super::{App, picture};
@@ -36,11 +36,11 @@ fn window(file: Option<PathBuf>) -> Harness<'static, App> {
 
 fn playing(home: &tempfile::TempDir) -> Harness<'static, App> {
     let mut opening = Opening::of(What::Recording(recording(home)));
-    opening.building = Some(TWIN.into());
+    opening.building = Some(Plan::File(TWIN.into()));
     opening.settings.follow.start = "W02".into();
     let mut window = window(None);
     let context = window.ctx.clone();
-    window.state_mut().open(opening, &context);
+    window.state_mut().open(opening, &context, false);
     until(&mut window, |app| app.snapshot().kind == Kind::Replay);
     window.get_by_label("Pause").click();
     until(&mut window, |app| !app.snapshot().pace.playing);
@@ -188,7 +188,7 @@ fn what_cannot_be_opened_is_told() {
         std::fs::write(&broken, bytes).unwrap();
         let mut window = window(None);
         let context = window.ctx.clone();
-        window.state_mut().open(Opening::of(What::Recording(broken.clone())), &context);
+        window.state_mut().open(Opening::of(What::Recording(broken.clone())), &context, false);
         until(&mut window, |app| app.snapshot().fault.is_some());
         let fault = window.state().snapshot().fault.clone().unwrap();
         assert!(fault.contains(word), "{fault}");
@@ -197,7 +197,7 @@ fn what_cannot_be_opened_is_told() {
     std::fs::write(&broken, &whole[..whole.len() / 2]).unwrap();
     let mut window = window(None);
     let context = window.ctx.clone();
-    window.state_mut().open(Opening::of(What::Recording(broken)), &context);
+    window.state_mut().open(Opening::of(What::Recording(broken)), &context, false);
     until(&mut window, |app| app.snapshot().fault.is_some() || app.snapshot().kind == Kind::Replay);
 }
 
@@ -217,10 +217,10 @@ fn the_whole_window_is_drawn_with_particles_and_path() {
     let home = tempfile::tempdir().unwrap();
     for dark in [false, true] {
         let mut opening = Opening::of(What::Recording(recording(&home)));
-        opening.building = Some(TWIN.into());
+        opening.building = Some(Plan::File(TWIN.into()));
         opening.settings.follow.start = "W02".into();
         let sheet = Sheet { size: [1280.0, 800.0], pixels_per_point: 1.0, dark };
-        let wanted = picture::Wanted { opening: Some(opening), layout: None, at: None, views: Vec::new(), sheet };
+        let wanted = picture::Wanted { openings: vec![opening], layout: None, at: None, views: Vec::new(), sheet };
         let drawn = match picture::draw(wanted) {
             Err(picture::Error::Offscreen(offscreen::Error::NoAdapter(told))) => return eprintln!("skipped: {told}"),
             drawn => drawn.unwrap(),

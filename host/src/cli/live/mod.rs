@@ -10,7 +10,8 @@ pub use places::{Places, Told};
 pub use show::Show;
 
 use super::located::InBuilding;
-use super::{Error, parameters};
+use super::shown::{Enough, Shoe, Watched};
+use super::{Error, parameters, window};
 use crate::calibration;
 use crate::link::recorder::Recorder;
 use crate::link::{Address, Connection};
@@ -24,7 +25,8 @@ use std::time::{Duration, Instant, SystemTime};
 /// Shows a shoe's steps as they come and records what it says
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Ctrl-C ends it. The port is opened anew as often as needed; steps that the shoe made meanwhile follow then.\n\
+    after_help = "The window shows it where there is a display, unless --headless or --quiet is given; closing it ends it, as\n\
+Ctrl-C does. The port is opened anew as often as needed; steps that the shoe made meanwhile follow then.\n\
 'sohle replay' takes the recording; with --raw it computes the steps again from the sensor's counts and tells whether\n\
 they are the same.\n\n\
 Examples:\n  sohle live serial:/dev/ttyACM0\n  sohle live tcp:127.0.0.1:7700 --raw --out walk.mcap\n  \
@@ -55,6 +57,9 @@ pub struct Args {
     /// Ends after so many steps
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
+    /// Opens no window; without a display there is none anyway
+    #[arg(long)]
+    headless: bool,
     /// How steps and summary are told
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -100,42 +105,64 @@ pub fn run(args: Args) -> Result<(), Error> {
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
 
     let places = Places::prepare(&args.place)?;
-    let recorder = if args.no_record { None } else { Some(begin(args.out.as_deref())?) };
+    let start = places.as_ref().map(|places| places.follower().settings().start.clone()).unwrap_or_default();
+    let recording = if args.no_record { None } else { Some(path(args.out.as_deref())) };
+    let recorder = recording.as_deref().map(begin).transpose()?;
     let opened = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let connection = Connection::open(args.address.clone());
     let opened_us = i64::try_from(opened.as_micros()).unwrap_or_default();
     let show = Show::new(&args, recorder, places, opened_us);
     show.head()?;
-    let mut listening = Listening::new(connection, show, values, args.raw);
-    let result = loop {
-        let enough = args.steps.is_some_and(|steps| listening.show().steps >= steps);
-        if enough || stop.load(Ordering::Relaxed) || until.is_some_and(|until| Instant::now() >= until) {
-            break Ok(());
+    let listening = Listening::new(connection, show, values, args.raw);
+    let steps = args.steps;
+    let enough: Enough = Box::new(move |show| {
+        let walked = steps.is_some_and(|steps| show.steps >= steps);
+        walked || stop.load(Ordering::Relaxed) || until.is_some_and(|until| Instant::now() >= until)
+    });
+    let shoe = Shoe { address: args.address.clone(), start, recording, listening };
+    let (listening, result) = if window::is_wanted(args.headless, args.quiet) {
+        match window::watch(shoe, enough)? {
+            Watched::Whole(listening) => (*listening, Ok(())),
+            Watched::Unopened(error, shoe, enough) => {
+                eprintln!("{error}");
+                listen(shoe.listening, enough)
+            }
         }
-        if let Err(error) = listening.turn(LOOK, |_, _| {}) {
-            break Err(error);
-        }
+    } else {
+        listen(shoe.listening, enough)
     };
-    if result.is_ok() {
-        listening.take_leave();
-    }
     let (connection, show) = listening.into_parts();
     show.finish(&connection)?;
     result
 }
 
-fn begin(path: Option<&Path>) -> Result<Recorder, Error> {
-    let path = path.map_or_else(
+/// Listens until it is enough.
+fn listen(mut listening: Listening, mut enough: Enough) -> (Listening, Result<(), Error>) {
+    while !enough(listening.show()) {
+        if let Err(error) = listening.turn(LOOK, |_, _| {}) {
+            return (listening, Err(error));
+        }
+    }
+    listening.take_leave();
+    (listening, Ok(()))
+}
+
+/// The recording that was asked for, or one that says when it was begun.
+fn path(asked: Option<&Path>) -> PathBuf {
+    asked.map_or_else(
         || {
             let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
             PathBuf::from(format!("sohle-live-{}.mcap", since.as_secs()))
         },
         Path::to_path_buf,
-    );
+    )
+}
+
+fn begin(path: &Path) -> Result<Recorder, Error> {
     // What was heard once comes never again.
     if path.is_file() {
         return Err(Error::new(format!("{} is there already; a live recording replaces nothing", path.display())));
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Recorder::begin(&path, &name)?)
+    Ok(Recorder::begin(path, &name)?)
 }

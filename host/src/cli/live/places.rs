@@ -152,11 +152,14 @@ impl Places {
         })
     }
 
-    /// Ends it: steps whose time never became known, the tracks, the pictures. What there is to tell.
-    pub fn finish(mut self, pictures: Option<&Path>, opened_us: i64) -> Result<String, Error> {
-        for step in std::mem::take(&mut self.waiting) {
-            self.follow(&step, None, None, opened_us);
-        }
+    /// Tells of the steps whose time will never become known: nothing comes any more.
+    pub fn rest(&mut self, opened_us: i64) -> Vec<Told> {
+        let steps = std::mem::take(&mut self.waiting);
+        steps.iter().filter_map(|step| self.follow(step, None, None, opened_us)).collect()
+    }
+
+    /// Ends it: the tracks, the pictures. What there is to tell.
+    pub fn finish(self, pictures: Option<&Path>) -> Result<String, Error> {
         let before = match self.before {
             0 => String::new(),
             before => format!("{before} steps from before the start were not followed\n"),

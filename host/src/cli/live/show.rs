@@ -302,6 +302,10 @@ impl Show {
 
     /// Tells how it went. An error if it went badly.
     pub fn finish(mut self, connection: &Connection) -> Result<(), Error> {
+        if let Some(places) = &mut self.places {
+            let told = places.rest(self.opened_us);
+            self.tell(told);
+        }
         let counters = connection.session().counters();
         let bound = connection.session().clock().error_bound().map(|bound| bound * 1e3);
         self.delays.sort_by(f64::total_cmp);
@@ -346,12 +350,10 @@ impl Show {
             }
         }
         let placed = match self.places.take() {
-            Some(places) => {
-                places.finish(self.pictures.as_deref(), self.opened_us).and_then(|told| match self.format {
-                    Format::Table => self.result(&told),
-                    Format::Json => Ok(()),
-                })
-            }
+            Some(places) => places.finish(self.pictures.as_deref()).and_then(|told| match self.format {
+                Format::Table => self.result(&told),
+                Format::Json => Ok(()),
+            }),
             None => Ok(()),
         };
         if let Some(recorder) = self.recorder.take() {

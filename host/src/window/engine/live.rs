@@ -23,10 +23,21 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
+/// Listens for somebody who wants to know when it is enough, and what came of it.
+pub struct End {
+    /// Whether it is enough.
+    pub enough: Box<dyn FnMut(&Show) -> bool + Send>,
+    /// Takes what was listened with, after all of it.
+    pub ended: Box<dyn FnOnce(Listening) + Send>,
+}
+
 /// A shoe.
 pub struct Live {
     address: Address,
-    listening: Listening,
+    /// Nothing after it was handed back.
+    listening: Option<Listening>,
+    end: Option<End>,
+    ended: bool,
     heard: Told,
     /// Where the walk begins.
     start: String,
@@ -37,6 +48,9 @@ pub struct Live {
     /// The recording that is being written.
     recording: Option<PathBuf>,
 }
+
+/// Only who drops it takes that away.
+const WHOLE: &str = "what is listened with is there until the end";
 
 /// What the shoe has told.
 #[derive(Default)]
@@ -71,7 +85,6 @@ impl Live {
         building: Option<crate::building::Building>,
         settings: &follow::Settings,
     ) -> Result<Self, follow::Error> {
-        let scene = building.as_ref().map(|building| Arc::new(Scene::of(building)));
         let places = match building {
             None => None,
             Some(building) => {
@@ -83,21 +96,45 @@ impl Live {
         let opened = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let show = Show::silent(places, i64::try_from(opened.as_micros()).unwrap_or_default());
         let connection = Connection::open(address.clone());
-        Ok(Self {
+        let listening = Listening::new(connection, show, Vec::new(), false);
+        Ok(Self::of(address, listening, settings.start.clone(), None))
+    }
+
+    /// Shows what somebody listens to, who recorded it, if at all, into `recording`, and followed it from `start`.
+    pub fn of(address: Address, listening: Listening, start: String, recording: Option<PathBuf>) -> Self {
+        let places = listening.show().places.as_ref();
+        let scene = places.map(|places| Arc::new(Scene::of(places.follower().building())));
+        Self {
             address,
-            listening: Listening::new(connection, show, Vec::new(), false),
+            listening: Some(listening),
+            end: None,
+            ended: false,
             heard: Told { state: "looking for the shoe".into(), ..Told::default() },
-            start: settings.start.clone(),
+            start,
             scene,
             drawing: Drawing::default(),
             epoch: 0,
             fault: None,
-            recording: None,
-        })
+            recording,
+        }
+    }
+
+    /// For somebody who is told when it ends.
+    pub fn until(mut self, end: End) -> Self {
+        self.end = Some(end);
+        self
+    }
+
+    fn listening(&self) -> &Listening {
+        self.listening.as_ref().expect(WHOLE)
+    }
+
+    fn listening_mut(&mut self) -> &mut Listening {
+        self.listening.as_mut().expect(WHOLE)
     }
 
     fn follower(&self) -> Option<&Follower> {
-        self.listening.show().places.as_ref().map(Places::follower)
+        self.listening().show().places.as_ref().map(Places::follower)
     }
 
     fn order(&mut self, order: Order) {
@@ -105,12 +142,12 @@ impl Live {
             self.fault = Some("no shoe is connected yet".into());
             return;
         }
-        let number = self.listening.order(order);
+        let number = self.listening_mut().order(order);
         self.heard.asked.push((number, order));
     }
 
     fn begin(&mut self, start: &str) {
-        let Some(places) = &mut self.listening.show_mut().places else { return };
+        let Some(places) = &mut self.listening_mut().show_mut().places else { return };
         match places.begin_anew(start) {
             Ok(()) => self.heard.anchor = None,
             Err(error) => self.fault = Some(error.to_string()),
@@ -119,7 +156,7 @@ impl Live {
     }
 
     fn record(&mut self, path: Option<PathBuf>) {
-        let ended = self.listening.show_mut().recorded();
+        let ended = self.listening_mut().show_mut().recorded();
         self.recording = None;
         let Some(path) = path else {
             self.fault = ended;
@@ -132,9 +169,9 @@ impl Live {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         match Recorder::begin(&path, &name) {
             Ok(recorder) => {
-                let time = self.listening.connection().now();
+                let time = self.listening().connection().now();
                 let hello = self.heard.hello.clone().map(|hello| Heard { time, message: FromShoe::Hello(hello) });
-                self.listening.show_mut().record(recorder, hello);
+                self.listening_mut().show_mut().record(recorder, hello);
                 self.recording = Some(path);
             }
             Err(error) => self.fault = Some(error.to_string()),
@@ -175,6 +212,7 @@ impl Source for Live {
         loop {
             let left = until.saturating_duration_since(Instant::now());
             let Self { heard, listening, .. } = self;
+            let listening = listening.as_mut().expect(WHOLE);
             let turned = listening.turn(left, |happening, connection| heard.take(happening, connection));
             if let Err(error) = turned {
                 self.fault = Some(error.to_string());
@@ -188,22 +226,27 @@ impl Source for Live {
             }
         }
         if self.heard.fresh {
-            let estimate = self.listening.show().places.as_ref().map(|places| places.follower().estimate());
+            let estimate = self.listening().show().places.as_ref().map(|places| places.follower().estimate());
             let found = estimate.and_then(|estimate| Anchor::found(&self.heard.track, estimate));
             self.heard.anchor = self.heard.anchor.or(found);
+        }
+        if let (Some(end), Some(listening), false) = (&mut self.end, &self.listening, self.ended) {
+            self.ended = (end.enough)(listening.show());
+            self.heard.fresh |= self.ended;
         }
         // The work itself waits for what comes.
         Work { changed: self.heard.fresh, pause: Some(Duration::ZERO) }
     }
 
     fn snapshot(&mut self) -> Snapshot {
-        let follower = self.listening.show().places.as_ref().map(Places::follower);
-        let heard = &self.heard;
+        let Self { listening, drawing, heard, .. } = self;
+        let listening = listening.as_ref().expect(WHOLE);
+        let follower = listening.show().places.as_ref().map(Places::follower);
         let foot = heard.foot();
-        let overlay = self.drawing.draw(&heard.track, follower, heard.anchor.as_ref(), foot, self.epoch);
+        let overlay = drawing.draw(&heard.track, follower, heard.anchor.as_ref(), foot, self.epoch);
         let signals = heard.history.share();
         let span = signals.span().unwrap_or_default();
-        let session = self.listening.connection().session();
+        let session = listening.connection().session();
         let frames = session.counters().frames;
         let status = heard.status.as_ref();
         let mut warnings = warnings(&status.map(|status| status.tracker).unwrap_or_default(), follower);
@@ -246,14 +289,19 @@ impl Source for Live {
             }),
             fault: self.fault.clone(),
             stepped: heard.stepped,
+            ended: self.ended,
         }
     }
 }
 
 impl Drop for Live {
     fn drop(&mut self) {
-        self.listening.take_leave();
-        self.listening.show_mut().recorded();
+        let Some(mut listening) = self.listening.take() else { return };
+        listening.take_leave();
+        match self.end.take() {
+            Some(end) => (end.ended)(listening),
+            None => _ = listening.show_mut().recorded(),
+        }
     }
 }
 

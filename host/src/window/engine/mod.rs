@@ -13,7 +13,7 @@ pub mod signals;
 pub mod snapshot;
 pub mod walk;
 
-pub use opening::{Opening, What};
+pub use opening::{Opening, Plan, What};
 pub use signals::{Signal, Signals};
 pub use snapshot::{Kind, Pace, Snapshot};
 
@@ -62,6 +62,9 @@ pub struct Work {
     pub pause: Option<Duration>,
 }
 
+/// Makes what is to be shown, in the thread that computes it; or tells why there is nothing.
+pub type Make = Box<dyn FnOnce() -> Result<Box<dyn Source>, opening::Error> + Send>;
+
 /// Something to be shown.
 pub trait Source {
     /// Does what the window asks for.
@@ -74,8 +77,6 @@ pub trait Source {
     fn snapshot(&mut self) -> Snapshot;
 }
 
-/// A shoe that has gone is not waited for longer than its own answers take.
-const PATIENCE: Duration = Duration::from_secs(25);
 /// Work in one go, before commands are looked at.
 const TURN: Duration = Duration::from_millis(10);
 /// Between two snapshots.
@@ -91,8 +92,8 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Opens something in a thread of its own. `wake` is called when there is something to show.
-    pub fn start(opening: Opening, wake: impl Fn() + Send + 'static) -> Self {
+    /// Makes something of this name in a thread of its own. `wake` is called when there is something to show.
+    pub fn start(name: String, make: Make, wake: impl Fn() + Send + 'static) -> Self {
         let (commands, asked) = mpsc::channel();
         let latest = Arc::new(Mutex::new(None));
         let post = latest.clone();
@@ -101,12 +102,10 @@ impl Engine {
             wake();
         };
         let thread = std::thread::spawn(move || {
-            publish(Snapshot { name: opening.name(), kind: Kind::Opening, ..Snapshot::default() });
-            match opening.open() {
+            publish(Snapshot { name: name.clone(), kind: Kind::Opening, ..Snapshot::default() });
+            match make() {
                 Ok(mut source) => run(source.as_mut(), &asked, publish),
-                Err(error) => {
-                    publish(Snapshot { name: opening.name(), fault: Some(error.to_string()), ..Snapshot::default() });
-                }
+                Err(error) => publish(Snapshot { name, fault: Some(error.to_string()), ..Snapshot::default() }),
             }
         });
         Self { commands, thread, latest }
@@ -117,14 +116,9 @@ impl Engine {
         let _ = self.commands.send(command);
     }
 
-    /// Ends it and waits until it has ended, so that a recording is whole; not for ever.
-    pub fn finish(self) {
-        let Self { commands, thread, .. } = self;
-        drop(commands);
-        let begun = Instant::now();
-        while !thread.is_finished() && begun.elapsed() < PATIENCE {
-            std::thread::sleep(TURN);
-        }
+    /// Ends it. A recording is whole when the thread has ended.
+    pub fn leave(self) -> JoinHandle<()> {
+        self.thread
     }
 
     /// The latest snapshot, once.

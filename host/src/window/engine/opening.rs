@@ -52,6 +52,33 @@ impl fmt::Display for What {
     }
 }
 
+/// A building that somebody is followed in.
+#[derive(Clone, Debug)]
+pub enum Plan {
+    /// It is read first.
+    File(PathBuf),
+    /// It was read.
+    Read(Arc<Building>),
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => write!(out, "{}", path.display()),
+            Self::Read(building) => write!(out, "{}", building.name),
+        }
+    }
+}
+
+impl Plan {
+    fn building(&self) -> Result<Building, building::Error> {
+        match self {
+            Self::File(path) => open(path, &Options::default()),
+            Self::Read(building) => Ok(Building::clone(building)),
+        }
+    }
+}
+
 /// What is to be opened, and how.
 #[derive(Clone, Debug)]
 pub struct Opening {
@@ -60,15 +87,17 @@ pub struct Opening {
     /// How a recording is laid out; recognised from the content when left out.
     pub profile: Option<Profile>,
     /// The building to follow in.
-    pub building: Option<PathBuf>,
+    pub building: Option<Plan>,
     /// How it is followed.
     pub settings: Settings,
+    /// How a phone's steps are found.
+    pub phone: phone::Parameters,
 }
 
 impl Opening {
     /// A recording or a shoe, by the steps alone.
     pub fn of(what: What) -> Self {
-        Self { what, profile: None, building: None, settings: Settings::default() }
+        Self { what, profile: None, building: None, settings: Settings::default(), phone: phone::Parameters::default() }
     }
 
     /// What it is called.
@@ -84,7 +113,7 @@ impl Opening {
     /// # Errors
     /// When recording or building cannot be read, have nothing in them, or do not go together.
     pub fn open(&self) -> Result<Box<dyn Source>, Error> {
-        let building = self.building.as_ref().map(|path| open(path, &Options::default())).transpose()?;
+        let building = self.building.as_ref().map(Plan::building).transpose()?;
         match &self.what {
             What::Shoe(address) => Ok(Box::new(Live::new(address.clone(), building, &self.settings.follow)?)),
             What::Recording(path) => self.replay(path, building),
@@ -98,7 +127,7 @@ impl Opening {
                 settings.follow.particle = particle::Parameters::phone();
             }
             let samples = phone::open::open(path)?.samples;
-            let steps = phone::steps(&samples, &phone::Parameters::default());
+            let steps = phone::steps(&samples, &self.phone);
             Recording { name: self.name(), steps, ..Recording::default() }
         } else {
             recording::open(path, self.profile.as_ref())?

@@ -130,6 +130,7 @@ impl Source for Replay {
 
     fn work(&mut self, until: Instant) -> Work {
         let before = (self.walk.now().index, self.walk.now().track.steps.len());
+        let begun = Instant::now();
         let late = |_: &Moment| Instant::now() >= until;
         match self.goal {
             Goal::Item(index) => {
@@ -161,7 +162,8 @@ impl Source for Replay {
         }
         let after = (self.walk.now().index, self.walk.now().track.steps.len());
         if after.1 > before.1 {
-            self.stepped = Some(Instant::now());
+            // It came since then, and was followed.
+            self.stepped = Some(begun);
         }
         let pause = match self.goal {
             Goal::Here if !self.pace.playing => None,
@@ -200,6 +202,7 @@ impl Source for Replay {
             link: None,
             fault: self.fault.clone(),
             stepped: self.stepped,
+            ended: false,
         }
     }
 }

@@ -134,4 +134,6 @@ pub struct Snapshot {
     pub fault: Option<String>,
     /// When the last step came.
     pub stepped: Option<Instant>,
+    /// It was to be shown until now; whoever opened it for so long closes the window.
+    pub ended: bool,
 }
