@@ -134,6 +134,9 @@ fn a_floor_above_hides_what_is_below_until_it_is_hidden_itself() {
     let hidden = View { hidden: [1, 2].into(), ..View::default() };
     let open = picture(&mut studio, SHEET, &hidden, &drawn);
     assert!(count(&open, RED) > count(&covered, RED) + 100);
+    // As soon as it is known where the person is, nothing hides it.
+    let known = picture(&mut studio, SHEET, &View::default(), &overlay());
+    assert!(count(&known, RED) > count(&covered, RED) + 100);
 }
 
 #[test]
@@ -225,6 +228,10 @@ fn buttons_have_names_and_do_what_they_say() {
     harness.get_by_label("All").click();
     harness.run();
     assert_eq!((harness.state().view.level, harness.state().view.hidden.len()), (None, 0));
+    assert!(!harness.state().view.auto);
+    harness.get_by_label("Auto").click();
+    harness.run();
+    assert!(harness.state().view.level.is_none() && harness.state().view.auto);
     harness.get_by_label("Follow").click();
     harness.run();
     assert!(harness.state().view.follow);

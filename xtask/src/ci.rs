@@ -2,7 +2,7 @@
 
 use crate::process::{self, Failure};
 use crate::stage::{Run, Tally};
-use crate::{bench, check, determinism, device, emulate, emulator, firmware, fuzz, tools};
+use crate::{bench, check, determinism, device, emulate, emulator, firmware, fuzz, tools, window};
 use std::process::Command;
 
 /// How to run the checks.
@@ -44,6 +44,7 @@ pub fn run(arguments: &Arguments) -> bool {
     run.check("firmware", || firmware::run(&firmware::Arguments::default()));
     run.check("bits on a Cortex-M4F", emulator::run);
     run.check("the emulated shoe", emulate::check);
+    run.check("the window", window::check);
     run.check("cost", bench::run);
     run.check("determinism", determinism::run);
     run.summary()

@@ -120,10 +120,11 @@ fn file(path: &Path, source: std::io::Error) -> Failure {
 }
 
 /// The emulator while it runs.
-struct Running(Child);
+pub struct Running(Child);
 
 impl Running {
-    fn start(port: u16, counts: &Path) -> Result<Self, Failure> {
+    /// Starts it with the counts that its sensor gives.
+    pub fn start(port: u16, counts: &Path) -> Result<Self, Failure> {
         let mut command = machine(port, counts);
         // It tells that it waits, and when this machine is too slow for real time.
         let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
@@ -308,7 +309,7 @@ fn live_walk(
 }
 
 /// A port that nobody listens on now.
-fn free_port() -> Result<u16, Failure> {
+pub fn free_port() -> Result<u16, Failure> {
     let listener = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
     listener.map(|address| address.port()).map_err(|error| Failure::Found(format!("no free port: {error}")))
 }

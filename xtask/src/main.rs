@@ -14,6 +14,7 @@ mod process;
 mod recordings;
 mod stage;
 mod tools;
+mod window;
 
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -43,6 +44,8 @@ enum Command {
     Flash(firmware::FlashArguments),
     /// Counts the instructions of the documented and the default filter under callgrind.
     Bench,
+    /// Opens the window on a display of its own by 'demo', 'replay' and 'live' with an emulated shoe, and looks at it.
+    Window,
     /// Evaluates in debug and release builds, on one and two threads: the outputs must be the same.
     Determinism,
     /// Gives arbitrary input to everything that reads what others wrote; exit code 1 when a promise is broken.
@@ -74,6 +77,7 @@ fn main() -> ExitCode {
         Command::Firmware(arguments) => firmware::run(&arguments),
         Command::Flash(arguments) => firmware::flash(&arguments),
         Command::Bench => bench::run(),
+        Command::Window => window::check(),
         Command::Determinism => determinism::run(),
         Command::Fuzz(arguments) => fuzz::run(&arguments),
         Command::Recordings(arguments) => recordings::run(&arguments),

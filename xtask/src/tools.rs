@@ -51,8 +51,11 @@ pub const LAVAPIPE: Tool = Tool {
     packages: &["mesa-vulkan-drivers"],
 };
 
+/// A display that nobody sees.
+pub const XVFB: Tool = Tool { what: "a display in memory", present_by: &["Xvfb"], packages: &["xvfb"] };
+
 /// Everything.
-pub const ALL: [Tool; 8] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD, LAVAPIPE];
+pub const ALL: [Tool; 9] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD, LAVAPIPE, XVFB];
 
 impl Tool {
     /// Whether the machine has it.

@@ -12,6 +12,13 @@ pub fn distance(a: Point, b: Point) -> f64 {
     (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
+/// The same angle within half a turn. **Units:** rad.
+pub fn wrapped(angle: f64) -> f64 {
+    use std::f64::consts::PI;
+    // What is within it keeps its bits.
+    if angle.abs() <= PI { angle } else { (angle + PI).rem_euclid(2.0 * PI) - PI }
+}
+
 /// Length of a segment.
 pub fn length(segment: &Segment) -> f64 {
     distance(segment[0], segment[1])

@@ -196,6 +196,12 @@ impl Building {
         self.floors.iter().find(|floor| floor.number == number)
     }
 
+    /// Stairs, ramp or elevator at a point of a floor.
+    pub fn connector_at(&self, floor: i32, point: Point) -> Option<&Connector> {
+        let holds = |(number, outline): &(i32, Outline)| *number == floor && geometry::contains(outline, point);
+        self.connectors.iter().find(|connector| connector.outlines.iter().any(holds))
+    }
+
     /// Where the room of this name is: its floor and itself. The name may be that of the room alone, or that of the floor and
     /// the room with a slash between them when several floors have one.
     pub fn room(&self, name: &str) -> Option<(&Floor, &Room)> {

@@ -26,6 +26,7 @@ mod motion;
 pub mod parameters;
 mod random;
 mod resampling;
+pub mod settings;
 mod sight;
 pub mod speed;
 pub mod start;

@@ -1,6 +1,7 @@
 //! Settings of the particle filter.
 
 use super::Error;
+use super::settings::SETTINGS;
 
 /// How particles move, are weighed and are drawn anew.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -148,34 +149,10 @@ impl Parameters {
         let between = |name: &'static str, value: f32, low: f32, high: f32| {
             if (low..=high).contains(&value) { Ok(()) } else { Err(Error::Setting { name, value, low, high }) }
         };
-        between("spacing_m", p.spacing_m, 0.05, 10.0)?;
-        between("headings", p.headings as f32, 1.0, 360.0)?;
-        between("room_prior", p.room_prior, 0.0, 1.0)?;
-        between("least", p.least as f32, 10.0, 1e6)?;
-        between("most", p.most as f32, p.least as f32, 1e7)?;
-        for (index, name) in ["phi", "phi (height)", "phi (turn)"].into_iter().enumerate() {
-            between(name, p.phi[index], 0.0, 100.0)?;
+        for setting in SETTINGS {
+            between(setting.name, setting.value(p), setting.least, setting.largest)?;
         }
-        for (index, name) in ["psi", "psi (height)", "psi (turn)"].into_iter().enumerate() {
-            between(name, p.psi[index], 0.0, 100.0)?;
-        }
-        between("phi_z_m", p.phi_z_m, 1e-3, 10.0)?;
-        between("cluster_m (plane)", p.cluster_m[0], 0.1, 100.0)?;
-        between("cluster_m (height)", p.cluster_m[1], 0.1, 100.0)?;
-        between("place_sigma_m", p.place_sigma_m, 0.0, 10.0)?;
-        between("turn_sigma", p.turn_sigma, 0.0, 3.0)?;
-        between("turn_share", p.turn_share, 0.0, 10.0)?;
-        between("scale_sigma", p.scale_sigma, 0.0, 0.5)?;
-        between("scale_noise", p.scale_noise, 0.0, 0.5)?;
-        between("level_sigma_m", p.level_sigma_m, 1e-3, 10.0)?;
-        between("exit_sigma_m", p.exit_sigma_m, 1e-3, 10.0)?;
-        between("leak", p.leak, 1e-9, 0.5)?;
-        between("kld_error", p.kld_error, 0.005, 1.0)?;
-        between("resample_below", p.resample_below, 0.0, 1.0)?;
-        between("roughening", p.roughening, 0.0, 2.0)?;
-        between("lost_odds", p.lost_odds, 1.0, 1e3)?;
-        between("located_share", p.located_share, 0.5, 1.0)?;
-        between("located_sigma_m", p.located_sigma_m, 0.01, 100.0)
+        between("most", p.most as f32, p.least as f32, 1e7)
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::dialogs::{Dialog, Wanted};
 use super::engine::{Command, Kind, Make, Opening, Snapshot};
-use super::gpu::RenderState;
 use super::help;
 use super::layout::{Layout, Look, View};
 use super::map::{Map, Overlay, Scene};
@@ -34,8 +33,8 @@ pub struct App {
 }
 
 impl App {
-    /// A window that is laid out as its `file` says, and draws the map with `render`.
-    pub fn new(render: Option<&RenderState>, file: Option<PathBuf>) -> Self {
+    /// A window that is laid out as its `file` says, with a map if anything can draw one.
+    pub fn new(map: Option<Map>, file: Option<PathBuf>) -> Self {
         let (layout, told) = match file.as_deref().map(Layout::read) {
             Some(Ok(layout)) => (layout, String::new()),
             Some(Err(error)) => (Layout::default(), error.to_string()),
@@ -43,7 +42,7 @@ impl App {
         };
         Self {
             shoes: Shoes::default(),
-            map: render.map(Map::new),
+            map,
             ground: Arc::new(Scene::open_ground()),
             layout,
             file,
@@ -123,7 +122,7 @@ impl App {
         });
         if self.layout.selector {
             Panel::left("views")
-                .default_size(140.0)
+                .default_size(160.0)
                 .show(ui, |ui| selector::show(ui, &mut self.layout, &mut self.shoes));
         }
         CentralPanel::no_frame().show(ui, |ui| self.views(ui, &snapshot, &mut commands));

@@ -4,6 +4,7 @@
 //! Foot, 6.2.2.
 
 use super::map::palette::{Palette, Rgb, colour};
+use crate::building::geometry::wrapped;
 use eframe::egui::{
     self, Align2, Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
@@ -84,7 +85,7 @@ impl Cube {
             *self = Self::default();
         }
         let drag = response.drag_delta();
-        self.bearing = super::map::camera::wrapped(self.bearing + f64::from(drag.x) * 0.01);
+        self.bearing = wrapped(self.bearing + f64::from(drag.x) * 0.01);
         self.elevation = (self.elevation + f64::from(drag.y) * 0.01).clamp(0.05, 1.5);
         if rect.width() < 20.0 || rect.height() < 20.0 {
             return response;

@@ -141,6 +141,7 @@ impl Default for Layout {
             Plot::of("Rate", &[Signal::GyroNorm]),
             Plot { logarithmic: true, ..Plot::of("Stance", &[Signal::Statistic, Signal::Bound]) },
             Plot::of("Motion", &[Signal::Speed, Signal::Height]),
+            Plot { logarithmic: true, ..Plot::of("Update", &[Signal::Innovation, Signal::VelocitySigma]) },
             Plot { logarithmic: true, ..Plot::of("Particles", &[Signal::Particles, Signal::Effective]) },
             Plot::of("Place", &[Signal::PlaceSigma, Signal::Probability, Signal::Fit]),
             Plot::of("Link", &[Signal::Delay, Signal::FramesBad, Signal::Waiting]),

@@ -8,6 +8,7 @@ use super::engine::replay::Replay;
 use super::engine::walk::{Settings, Walk};
 use super::engine::{Command, Kind, Source};
 use super::gpu::offscreen::{Error, Sheet, Studio};
+use super::map::Map;
 use crate::building::{Building, generate, route};
 use crate::follow;
 use crate::particle;
@@ -61,7 +62,7 @@ pub fn latency(
         Ok(Box::new(Replay::new(walk)) as Box<dyn Source>)
     };
     let mut make = Some(make);
-    let mut app = App::new(Some(studio.render()), None);
+    let mut app = App::new(Some(Map::quick(studio.render())), None);
     let begun = Instant::now();
     let mut fast = false;
     loop {

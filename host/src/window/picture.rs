@@ -4,6 +4,7 @@ use super::App;
 use super::engine::{Command, Kind, Opening};
 use super::gpu::offscreen::{self, Picture, Sheet, Studio};
 use super::layout::{Look, View};
+use super::map::Map;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -50,7 +51,7 @@ const PAUSE: Duration = Duration::from_millis(20);
 pub fn draw(wanted: Wanted) -> Result<Picture, Error> {
     let Wanted { openings, layout, at, views, sheet } = wanted;
     let mut studio = Studio::new()?;
-    let mut app = App::new(Some(studio.render()), layout);
+    let mut app = App::new(Some(Map::new(studio.render())), layout);
     app.layout().look = if sheet.dark { Look::Dark } else { Look::Light };
     views.into_iter().for_each(|view| app.layout().open(view));
     let begun = Instant::now();

@@ -2,6 +2,7 @@
 
 use super::App;
 use super::engine::{Make, Opening};
+use super::map::Map;
 use eframe::egui::{ViewportBuilder, ViewportCommand};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -50,7 +51,7 @@ pub fn window(first: Vec<First>, layout: Option<PathBuf>, duration: Option<Durat
         "sohle",
         options,
         Box::new(move |creation| {
-            let mut app = App::new(creation.wgpu_render_state.as_ref(), layout);
+            let mut app = App::new(creation.wgpu_render_state.as_ref().map(Map::quick), layout);
             for (index, first) in first.into_iter().enumerate() {
                 match first {
                     First::Opening(opening) => app.open(*opening, &creation.egui_ctx, index > 0),

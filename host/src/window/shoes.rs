@@ -194,18 +194,22 @@ impl Shoes {
             ui.horizontal(|ui| {
                 let (rect, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), egui::Sense::hover());
                 ui.painter().circle_filled(rect.center(), 5.0, colour(shoe.colour));
-                let close = ui.small_button("✖").on_hover_text("Closes it");
-                close.widget_info(|| {
-                    let told = format!("Close {}", snapshot.name);
-                    egui::WidgetInfo::labeled(egui::WidgetType::Button, true, told)
+                // Both may be cut, or be a mere mark: the whole name is told to who cannot see it.
+                let named = |response: egui::Response, told: String| {
+                    response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, &told));
+                    response.on_hover_text(told)
+                };
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    if named(ui.small_button("✖"), format!("Close {}", snapshot.name)).clicked() {
+                        asked = Some(Asked::Close(index));
+                    }
+                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                        let name = egui::Button::selectable(index == self.selected, &snapshot.name).truncate();
+                        if named(ui.add(name), snapshot.name.clone()).clicked() {
+                            asked = Some(Asked::Select(index));
+                        }
+                    });
                 });
-                if close.clicked() {
-                    asked = Some(Asked::Close(index));
-                }
-                let name = egui::Button::selectable(index == self.selected, &snapshot.name).truncate();
-                if ui.add(name).clicked() {
-                    asked = Some(Asked::Select(index));
-                }
             });
             ui.add(egui::Label::new(RichText::new(known(snapshot)).small().weak()).truncate());
         }

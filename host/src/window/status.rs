@@ -78,6 +78,11 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, latency: Option<Latency>) {
                 ],
             );
         }
+        if let Some(decided) = &snapshot.on_graph {
+            ui.separator();
+            ui.label(RichText::new("on the graph").strong());
+            ui.add(egui::Label::new(RichText::new(decided).small()).wrap());
+        }
         if let Some(link) = &snapshot.link {
             ui.separator();
             line(ui, link);

@@ -1,27 +1,34 @@
 //! Every control of the window, as those know it who cannot see it, and the window as a whole.
 
-use super::engine::{Kind, Opening, Plan, What};
+use super::engine::{Command, Kind, Opening, Plan, What};
 use super::gpu::offscreen::{self, Sheet};
 use super::layout::{Layout, View};
+use super::map::{self, Projection, Role};
 use super::{App, picture};
 use crate::building::{geojson, route};
 use crate::simulation::{Route, Scenario, SensorModel, output};
 use eframe::egui::{Key, Modifiers};
+use egui_dock::DockState;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const TWIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../buildings/twin.geojson");
 
 /// A walk in the twin, in a folder of its own.
 fn recording(home: &tempfile::TempDir) -> PathBuf {
+    named(home, "a walk with a name that is far longer than any toolbar has room for")
+}
+
+fn named(home: &tempfile::TempDir, name: &str) -> PathBuf {
     let building = geojson::parse(&std::fs::read_to_string(TWIN).unwrap(), TWIN).unwrap();
     let route = Route::through(&building, &route::plan(&building, &["W02", "hall"]).unwrap()).unwrap();
     let mut sensor = SensorModel::bmx055_calibrated();
     (sensor.accel.rate, sensor.gyro.rate) = (400.0, 400.0);
     let scenario = Scenario { route, sensor, ..Scenario::default() };
-    let path = home.path().join("a walk with a name that is far longer than any toolbar has room for.mcap");
+    let path = home.path().join(format!("{name}.mcap"));
     output::write(&scenario, &path, 20, |_| {}).unwrap();
     path
 }
@@ -85,7 +92,7 @@ fn a_recording_is_played_and_gone_through_by_its_buttons() {
     let home = tempfile::tempdir().unwrap();
     let mut window = playing(&home);
     let [first, last] = window.state().snapshot().span;
-    window.state().ask(super::engine::Command::Jump(first));
+    window.state().ask(Command::Jump(first));
     until(&mut window, |app| app.snapshot().computing.is_none() && app.snapshot().steps == 0);
     for steps in 1..4 {
         window.get_by_label("To the next step").click();
@@ -129,6 +136,78 @@ fn settings_are_bounded_and_apply_at_once() {
     write(&mut window, "Find", "stance.floor");
     assert!(window.query_all_by_label("stance.floor").next().is_some());
     assert!(window.query_by_label("stance.ceiling").is_none());
+}
+
+#[test]
+fn settings_of_the_particle_filter_apply_at_once_too() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = playing(&home);
+    window.state_mut().layout().open(View::Parameters);
+    window.run_steps(2);
+    window.get_by_label("Particle filter").click();
+    window.run_steps(2);
+    window.get_by_label("Phone").click();
+    let phone = crate::particle::Parameters::phone();
+    until(&mut window, |app| app.snapshot().particle.as_deref() == Some(&phone));
+    write(&mut window, "Find", "turn_");
+    assert!(window.query_all_by_label("turn_share").next().is_some());
+    assert!(window.query_by_label("leak").is_none());
+}
+
+#[test]
+fn the_walk_graph_is_followed_on_when_that_is_asked_for() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = playing(&home);
+    window.get_by_label("On the graph").click();
+    until(&mut window, |app| app.snapshot().on_graph.is_some());
+    window.key_press(Key::End);
+    let way = |app: &App| {
+        let tracks = &app.snapshot().overlay.tracks;
+        tracks.iter().find(|track| track.role == Role::Other).map_or(0, |track| track.pieces[0].len())
+    };
+    until(&mut window, |app| app.snapshot().computing.is_none() && way(app) > 1);
+    // What was decided at the last step, and where that leaves somebody.
+    assert!(window.query_all_by_label_contains(", delta ").next().is_some());
+    window.get_by_label("On the graph").click();
+    until(&mut window, |app| app.snapshot().on_graph.is_none() && way(app) == 0);
+}
+
+#[test]
+fn several_are_shown_each_in_its_colour_and_one_is_selected() {
+    let home = tempfile::tempdir().unwrap();
+    let (path, other) = (recording(&home), named(&home, "other"));
+    let mut window = window(None);
+    let context = window.ctx.clone();
+    for (beside, path) in [(false, &path), (true, &other)] {
+        let mut opening = Opening::of(What::Recording(path.clone()));
+        opening.building = Some(Plan::File(TWIN.into()));
+        opening.settings.follow.start = "W02".into();
+        window.state_mut().open(opening, &context, beside);
+        until(&mut window, |app| app.snapshot().kind == Kind::Replay);
+        window.state_mut().ask(Command::Play(false));
+        window.state_mut().ask(Command::Jump(f64::from(u16::MAX)));
+        until(&mut window, |app| app.snapshot().computing.is_none() && app.snapshot().steps > 5);
+    }
+    let (_, both) = window.state_mut().shoes().drawing();
+    assert_eq!((both.clouds.len(), both.people.len()), (2, 2));
+    assert!(both.clouds[0].colour.is_some() && both.clouds[0].colour != both.clouds[1].colour);
+    assert_eq!(both.people.iter().map(|person| person.selected).collect::<Vec<_>>(), [false, true]);
+    let estimates = both.tracks.iter().filter(|track| track.role == Role::Estimate).count();
+    assert!(estimates == 2 && both.tracks.len() > 2, "the selected one has all its ways");
+    // What did not change is not made anew.
+    let (_, again) = window.state_mut().shoes().drawing();
+    assert!(Arc::ptr_eq(&both.tracks[0].pieces, &again.tracks[0].pieces));
+    window.state_mut().shoes().select_person(0);
+    window.run_steps(2);
+    assert_ne!(window.state().snapshot().name, "other");
+    window.get_by_label("other").click();
+    window.run_steps(2);
+    assert_eq!(window.state().snapshot().name, "other");
+    window.get_by_label("Close other").click();
+    window.run_steps(2);
+    assert!(window.query_by_label("other").is_none() && window.state_mut().shoes().count() == 1);
+    let (_, one) = window.state_mut().shoes().drawing();
+    assert_eq!(one.clouds[0].colour, None, "alone, it is green");
 }
 
 #[test]
@@ -210,6 +289,51 @@ fn a_broken_layout_is_told_and_the_usual_one_is_there() {
     window.run_steps(12);
     assert!(window.query_all_by_label_contains("where it was at first").next().is_some());
     assert_eq!(window.state_mut().layout().plots, Layout::default().plots);
+}
+
+/// Each view by itself, and all of them, as they were when somebody looked at them last. Software draws the same everywhere but
+/// for single pixels; what a graphics card draws is not compared.
+#[test]
+fn every_view_looks_as_it_did() {
+    let home = tempfile::tempdir().unwrap();
+    let path = recording(&home);
+    let flat = map::View { projection: Projection::Flat, ..map::View::default() };
+    let only = |view: View| Layout { dock: DockState::new(vec![view]), selector: false, ..Layout::default() };
+    let wanted = [
+        ("window", [1000.0, 640.0], false, Layout::default()),
+        ("map", [480.0, 360.0], false, only(View::Map)),
+        ("map_dark", [480.0, 360.0], true, only(View::Map)),
+        ("map_flat", [480.0, 360.0], false, Layout { map: flat, ..only(View::Map) }),
+        ("attitude", [400.0, 400.0], false, only(View::Attitude)),
+        ("status", [400.0, 500.0], false, only(View::Status)),
+        ("parameters", [400.0, 500.0], false, only(View::Parameters)),
+        ("plot", [640.0, 320.0], false, only(View::Plot(2))),
+    ];
+    let mut results = egui_kittest::SnapshotResults::new();
+    for (name, size, dark, layout) in wanted {
+        let file = home.path().join(format!("{name}.json"));
+        layout.write(&file).unwrap();
+        let mut opening = Opening::of(What::Recording(path.clone()));
+        opening.building = Some(Plan::File(TWIN.into()));
+        opening.settings.follow.start = "W02".into();
+        let sheet = Sheet { size, pixels_per_point: 1.0, dark };
+        let wanted =
+            picture::Wanted { openings: vec![opening], layout: Some(file), at: Some(28.0), views: Vec::new(), sheet };
+        let drawn = match picture::draw(wanted) {
+            Err(picture::Error::Offscreen(offscreen::Error::NoAdapter(told))) => return eprintln!("skipped: {told}"),
+            drawn => drawn.unwrap(),
+        };
+        if !drawn.in_software {
+            return eprintln!("skipped: what a graphics card draws is not compared");
+        }
+        let [width, height] = drawn.size;
+        let image = image::RgbaImage::from_raw(width, height, drawn.pixels).unwrap();
+        // A thousandth of the pixels, for edges that fall the other way.
+        let options =
+            egui_kittest::SnapshotOptions::new().threshold(1.0).max_failed_pixels((width * height / 1_000) as usize);
+        results.add(egui_kittest::try_image_snapshot_options(&image, name, &options));
+    }
+    results.unwrap();
 }
 
 #[test]

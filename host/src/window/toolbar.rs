@@ -33,18 +33,13 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) -> Ve
     let open = matches!(snapshot.kind, Kind::Replay | Kind::Live);
     let live = snapshot.kind == Kind::Live;
     ui.horizontal_wrapped(|ui| {
-        let mut own = |ui: &mut Ui, enabled: bool, word: &str, told: &str, what: Asked| {
-            if ui.add_enabled(enabled, Button::new(word)).on_hover_text(told).clicked() {
-                asked.push(what);
-            }
-        };
-        own(ui, true, "View list", "Shows or hides the list of views", Asked::Selector);
+        own(ui, &mut asked, true, "View list", "Shows or hides the list of views", Asked::Selector);
         ui.separator();
-        own(ui, true, "Open…", "Plays a recording (Ctrl+O)", Asked::Open);
-        own(ui, true, "Connect…", "Connects to a shoe (Ctrl+K)", Asked::Connect);
+        own(ui, &mut asked, true, "Open…", "Plays a recording (Ctrl+O)", Asked::Open);
+        own(ui, &mut asked, true, "Connect…", "Connects to a shoe (Ctrl+K)", Asked::Connect);
         let recording = snapshot.link.as_ref().is_some_and(|link| link.recording.is_some());
         let word = if recording { "Stop recording" } else { "Start recording" };
-        own(ui, live, word, "Writes what the shoe says into a file", Asked::Record);
+        own(ui, &mut asked, live, word, "Writes what the shoe says into a file", Asked::Record);
         ui.separator();
         for (word, told, command) in [
             ("RESET", "Begins anew: the tracker, and who follows", Command::Reset),
@@ -56,15 +51,30 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) -> Ve
             }
         }
         ui.separator();
-        own(ui, open, "Export track", "Writes the path into a file", Asked::Track);
-        own(ui, true, "Export picture", "Writes a picture of the window", Asked::Picture);
+        let mut on_graph = snapshot.on_graph.is_some();
+        let told = "Follows on the walk graph of the building too, as the graph document does it";
+        let enabled = snapshot.whereabouts.is_some();
+        ui.add_enabled_ui(enabled, |ui| {
+            if ui.toggle_value(&mut on_graph, "On the graph").on_hover_text(told).changed() {
+                commands.push(Command::OnGraph(on_graph));
+            }
+        });
         ui.separator();
-        own(ui, true, "◑", "Light or dark", Asked::Look);
-        own(ui, true, "?", "Keys and mouse (F1)", Asked::Help);
+        own(ui, &mut asked, open, "Export track", "Writes the path into a file", Asked::Track);
+        own(ui, &mut asked, true, "Export picture", "Writes a picture of the window", Asked::Picture);
+        ui.separator();
+        own(ui, &mut asked, true, "◑", "Light or dark", Asked::Look);
+        own(ui, &mut asked, true, "?", "Keys and mouse (F1)", Asked::Help);
         ui.separator();
         ui.label(RichText::new(&snapshot.name).weak());
     });
     asked
+}
+
+fn own(ui: &mut Ui, asked: &mut Vec<Asked>, enabled: bool, word: &str, told: &str, what: Asked) {
+    if ui.add_enabled(enabled, Button::new(word)).on_hover_text(told).clicked() {
+        asked.push(what);
+    }
 }
 
 /// The bar below. `told` is what was said last.

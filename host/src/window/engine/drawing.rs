@@ -1,5 +1,6 @@
 //! What is drawn of somebody who is followed.
 
+use super::on_graph::OnGraph;
 use super::walk::{Anchor, Moment};
 use crate::follow::{Follower, runs};
 use crate::particle::{Particle, State};
@@ -15,6 +16,10 @@ const THINNING: usize = 10;
 #[derive(Debug, Default)]
 pub struct Drawing {
     truth: Option<Track>,
+    /// Who follows on the walk graph, and whether lengths of steps are measured.
+    on_graph: Option<(OnGraph, bool)>,
+    /// What was decided there.
+    decided: String,
     /// What was drawn after so many steps, and for which start.
     stepped: Option<(usize, usize, Overlay)>,
 }
@@ -26,7 +31,18 @@ impl Drawing {
             let way = truth.poses.iter().step_by(THINNING).map(|pose| pose.position).collect();
             track("truth", Role::Truth, vec![way])
         });
-        Self { truth, stepped: None }
+        Self { truth, ..Self::default() }
+    }
+
+    /// Follows on a walk graph too, or no longer. `measured`: lengths of steps are measured, not guessed.
+    pub fn follow_on(&mut self, on_graph: Option<OnGraph>, measured: bool) {
+        self.on_graph = on_graph.map(|on_graph| (on_graph, measured));
+        self.stepped = None;
+    }
+
+    /// What was decided at the last step on the walk graph, if one is followed on.
+    pub fn decided(&self) -> Option<String> {
+        self.on_graph.as_ref().map(|_| self.decided.clone())
     }
 
     /// Draws a moment of a walk. `epoch` is another number whenever it is another walk.
@@ -47,12 +63,24 @@ impl Drawing {
         let overlay = match &self.stepped {
             Some((at, known, overlay)) if *at == count && *known == epoch => overlay.clone(),
             _ => {
-                let overlay = self.after_step(follower);
+                let mut overlay = self.after_step(follower);
+                overlay.tracks.extend(self.way_on_graph(steps, anchor));
                 self.stepped = Some((count, epoch, overlay.clone()));
                 overlay
             }
         };
         self.with_foot(overlay, steps, anchor, foot, follower.is_some())
+    }
+
+    fn way_on_graph(&mut self, steps: &Steps, anchor: Option<&Anchor>) -> Option<Track> {
+        let (on_graph, measured) = self.on_graph.as_ref()?;
+        let Some(anchor) = anchor else {
+            self.decided = "waits until place and direction are known".into();
+            return None;
+        };
+        let way = on_graph.follow(steps, anchor, *measured);
+        self.decided = way.last.map_or_else(|| "waits for a step".into(), |last| last.to_string());
+        Some(track("on the graph", Role::Other, vec![way.places]))
     }
 
     fn after_step(&self, follower: Option<&Follower>) -> Overlay {

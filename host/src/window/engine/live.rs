@@ -1,6 +1,7 @@
 //! A shoe that is listened to, for the window: the same as `sohle live` does, without a word on the terminal.
 
 use super::drawing::Drawing;
+use super::on_graph::OnGraph;
 use super::replay::{warnings, whereabouts};
 use super::signals::{History, Row, Signal};
 use super::snapshot::{Kind, Link, Pace, Snapshot, Warning};
@@ -193,6 +194,13 @@ impl Source for Live {
             Command::Track => self.order(Order::Track),
             Command::Start(start) => self.begin(&start),
             Command::Record(path) => self.record(path),
+            Command::OnGraph(on) => {
+                let building = self.follower().map(|follower| follower.building().clone());
+                match building.filter(|_| on).map(|building| OnGraph::of(&building)).transpose() {
+                    Ok(on_graph) => self.drawing.follow_on(on_graph, true),
+                    Err(error) => self.fault = Some(error.to_string()),
+                }
+            }
             Command::Export(path) => {
                 let told = super::export::track(&path, &self.heard.track, self.follower());
                 self.fault = Some(told);
@@ -203,7 +211,8 @@ impl Source for Live {
             | Command::Jump(_)
             | Command::StepAhead
             | Command::StepBack
-            | Command::Tracker(_) => self.fault = Some("a shoe cannot be asked for this".into()),
+            | Command::Tracker(_)
+            | Command::Particle(_) => self.fault = Some("a shoe cannot be asked for this".into()),
         }
     }
 
@@ -272,8 +281,10 @@ impl Source for Live {
             scene: self.scene.clone(),
             overlay,
             signals,
+            on_graph: drawing.decided(),
             warnings,
             settings: None,
+            particle: None,
             link: Some(Link {
                 address: self.address.to_string(),
                 state: heard.state.clone(),

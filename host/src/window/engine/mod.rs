@@ -7,6 +7,8 @@ pub mod drawing;
 mod export;
 mod kept;
 pub mod live;
+mod moment;
+mod on_graph;
 pub mod opening;
 pub mod replay;
 pub mod signals;
@@ -17,6 +19,7 @@ pub use opening::{Opening, Plan, What};
 pub use signals::{Signal, Signals};
 pub use snapshot::{Kind, Pace, Snapshot};
 
+use crate::particle;
 use sohle_shared::tracker;
 use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
@@ -47,6 +50,10 @@ pub enum Command {
     Start(String),
     /// Settings of the tracker.
     Tracker(Box<tracker::Parameters>),
+    /// Settings of the particle filter.
+    Particle(Box<particle::Parameters>),
+    /// Follow on the walk graph of the building too, as the graph document does it, or end that.
+    OnGraph(bool),
     /// Record what is heard into this file, or end that.
     Record(Option<PathBuf>),
     /// Write the path into this file.

@@ -1,6 +1,7 @@
 //! A recorded walk that is played: at any speed, forwards and backwards, step by step.
 
 use super::drawing::Drawing;
+use super::on_graph::OnGraph;
 use super::snapshot::{Kind, Pace, Snapshot, Warning, Whereabouts};
 use super::walk::{Act, Moment, Settings, Walk};
 use super::{Command, Source, Work};
@@ -71,6 +72,16 @@ impl Replay {
         self.jump(index);
     }
 
+    fn follow_on(&mut self, on: bool) {
+        let on_graph = self.walk.building().filter(|_| on).map(OnGraph::of).transpose();
+        // Those of a phone are guessed: it has no samples of a foot.
+        let measured = !self.walk.recording().samples.is_empty();
+        match on_graph {
+            Ok(on_graph) => self.drawing.follow_on(on_graph, measured),
+            Err(error) => self.fault = Some(error.to_string()),
+        }
+    }
+
     fn play(&mut self, playing: bool) {
         if playing && self.walk.now().index == self.walk.len() {
             self.jump(0);
@@ -120,6 +131,12 @@ impl Source for Replay {
             Command::Tracker(tracker) => {
                 self.set(Settings { tracker: *tracker, ..self.walk.settings().clone() });
             }
+            Command::Particle(particle) => {
+                let mut settings = self.walk.settings().clone();
+                settings.follow.particle = *particle;
+                self.set(settings);
+            }
+            Command::OnGraph(on) => self.follow_on(on),
             Command::Record(_) => self.fault = Some("a recording is recorded already".into()),
             Command::Export(path) => {
                 let now = self.walk.now();
@@ -197,8 +214,10 @@ impl Source for Replay {
             scene: self.scene.clone(),
             overlay: self.drawing.moment(now, self.epoch),
             signals: self.walk.signals(),
+            on_graph: self.drawing.decided(),
             warnings: warnings(now.tracker.counters(), now.follower.as_ref()),
             settings: Some(Arc::new(settings.tracker)),
+            particle: now.follower.as_ref().map(|_| Arc::new(settings.follow.particle.clone())),
             link: None,
             fault: self.fault.clone(),
             stepped: self.stepped,
@@ -212,13 +231,18 @@ pub fn whereabouts(follower: &Follower) -> Whereabouts {
     let estimate = follower.estimate();
     let place = estimate.place();
     let floor = place.and_then(|place| follower.building().floor(place.floor));
-    let room = place.zip(floor).and_then(|(place, floor)| floor.room_at([place.position.x, place.position.y]));
+    let room = place.zip(floor).and_then(|(place, floor)| {
+        let point = [place.position.x, place.position.y];
+        let room = floor.room_at(point).map(|room| room.name.clone());
+        // Stairs and elevators are no rooms, and yet a word for where somebody is.
+        room.or_else(|| follower.building().connector_at(floor.number, point).map(|connector| connector.name.clone()))
+    });
     let name = |floor: &crate::building::Floor| {
         if floor.name.is_empty() { format!("floor {}", floor.number) } else { floor.name.clone() }
     };
     Whereabouts {
         state: estimate.state,
-        room: room.map(|room| room.name.clone()),
+        room,
         floor: floor.map(name),
         place: place.cloned(),
         particles: follower.particles().len(),

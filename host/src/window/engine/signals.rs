@@ -44,6 +44,8 @@ pub enum Signal {
     WaySigma,
     /// Standard deviation of the velocity.
     VelocitySigma,
+    /// What a zero-velocity update takes away of the velocity: with the foot at rest, nearly all of its innovation.
+    Innovation,
     /// Length of the last step.
     StepLength,
     /// Standard deviation of the likeliest place.
@@ -74,7 +76,7 @@ impl Signal {
     pub const COUNT: usize = Self::ALL.len();
 
     /// All, in their order.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 28] = [
         Self::AccelX,
         Self::AccelY,
         Self::AccelZ,
@@ -92,6 +94,7 @@ impl Signal {
         Self::Height,
         Self::WaySigma,
         Self::VelocitySigma,
+        Self::Innovation,
         Self::StepLength,
         Self::PlaceSigma,
         Self::Probability,
@@ -124,6 +127,7 @@ impl Signal {
             Self::Height => ("height above start", "m"),
             Self::WaySigma => ("sigma of the way", "m"),
             Self::VelocitySigma => ("sigma of the velocity", "m/s"),
+            Self::Innovation => ("velocity corrected", "m/s"),
             Self::StepLength => ("step length", "m"),
             Self::PlaceSigma => ("sigma of the place", "m"),
             Self::Probability => ("probability of the place", "1"),

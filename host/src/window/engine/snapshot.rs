@@ -1,7 +1,7 @@
 //! All that the window shows of a moment. Made by the engine, never changed, cheap to hand on.
 
 use super::signals::Signals;
-use crate::particle::{Cluster, State};
+use crate::particle::{self, Cluster, State};
 use crate::window::map::{Overlay, Scene};
 use nalgebra::UnitQuaternion;
 use sohle_shared::tracker;
@@ -124,10 +124,14 @@ pub struct Snapshot {
     pub overlay: Overlay,
     /// All signals so far.
     pub signals: Signals,
+    /// What the tracker on the walk graph decided at the last step, while it runs.
+    pub on_graph: Option<String>,
     /// What is not as it should be.
     pub warnings: Vec<Warning>,
     /// Settings of the tracker.
     pub settings: Option<Arc<tracker::Parameters>>,
+    /// Settings of the particle filter.
+    pub particle: Option<Arc<particle::Parameters>>,
     /// The line to the shoe.
     pub link: Option<Link>,
     /// What there is to tell of what was asked for last: why it was not done, or what came of it.

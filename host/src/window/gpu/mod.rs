@@ -8,7 +8,7 @@ mod pipeline;
 mod target;
 
 pub use pipeline::{Blend, Depth, Kind, Pipelines, uniform};
-pub use target::Target;
+pub use target::{Care, Target};
 
 /// What the window draws with: device, queue, and the painter of the controls.
 pub use eframe::egui_wgpu::RenderState;

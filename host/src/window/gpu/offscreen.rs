@@ -32,6 +32,8 @@ pub struct Picture {
     pub size: [u32; 2],
     /// The bytes.
     pub pixels: Vec<u8>,
+    /// Drawn by software, not by a graphics card.
+    pub in_software: bool,
 }
 
 /// How a picture is drawn.
@@ -208,6 +210,7 @@ impl Studio {
         let mapped = buffer.slice(..).get_mapped_range().map_err(|error| stuck(&error))?;
         let used = width as usize * 4;
         let pixels = mapped.chunks_exact(row as usize).flat_map(|bytes| bytes[..used].iter().copied()).collect();
-        Ok(Picture { size: [width, height], pixels })
+        let in_software = self.render.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+        Ok(Picture { size: [width, height], pixels, in_software })
     }
 }

@@ -1,7 +1,7 @@
 //! What is drawn how: the settings that the graphics card wants before anything is drawn.
 
 use super::RenderState;
-use super::target::{DEPTH_FORMAT, FORMAT, SAMPLES};
+use super::target::{DEPTH_FORMAT, FORMAT};
 use eframe::wgpu;
 use std::num::NonZeroU64;
 
@@ -53,11 +53,12 @@ pub struct Pipelines<'a> {
     module: wgpu::ShaderModule,
     group: wgpu::BindGroupLayout,
     layout: wgpu::PipelineLayout,
+    samples: u32,
 }
 
 impl<'a> Pipelines<'a> {
-    /// Of a shader in WGSL. `second` is the size of the second block; nothing when there is none. **Units:** bytes.
-    pub fn of(render: &'a RenderState, label: &str, source: &str, second: Option<NonZeroU64>) -> Self {
+    /// Of a shader in WGSL, for pictures with so many `samples`. `second` is the size of the second block; nothing when there is none. **Units:** bytes.
+    pub fn of(render: &'a RenderState, label: &str, source: &str, second: Option<NonZeroU64>, samples: u32) -> Self {
         let device = &render.device;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(label),
@@ -82,7 +83,7 @@ impl<'a> Pipelines<'a> {
             bind_group_layouts: &[Some(&group)],
             immediate_size: 0,
         });
-        Self { device, module, group, layout }
+        Self { device, module, group, layout, samples }
     }
 
     /// One way of drawing.
@@ -120,7 +121,7 @@ impl<'a> Pipelines<'a> {
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
             }),
-            multisample: wgpu::MultisampleState { count: SAMPLES, ..Default::default() },
+            multisample: wgpu::MultisampleState { count: self.samples, ..Default::default() },
             fragment: Some(wgpu::FragmentState {
                 module: &self.module,
                 entry_point: Some(kind.fragment),

@@ -8,22 +8,42 @@ use eframe::wgpu;
 pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Of the depth.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Samples a pixel; every adapter has four.
-pub const SAMPLES: u32 = 4;
+/// How much is spent on a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Care {
+    /// Samples a pixel: 1 or 4, which every adapter has.
+    pub samples: u32,
+    /// Of more particles in a cloud only some are drawn.
+    pub particles: usize,
+}
+
+impl Care {
+    /// For a picture that one has time for.
+    pub const BEST: Self = Self { samples: 4, particles: usize::MAX };
+    /// Where there is no graphics card: edges have steps, and a crowd of particles looks the same with fewer of them.
+    const SOFTWARE: Self = Self { samples: 1, particles: 10_000 };
+
+    /// So that a window moves with ease.
+    pub fn quick(render: &RenderState) -> Self {
+        let software = render.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+        if software { Self::SOFTWARE } else { Self::BEST }
+    }
+}
 
 /// A picture of some size, and what is needed to draw it.
 #[derive(Debug)]
 pub struct Target {
     size: [u32; 2],
     id: TextureId,
-    samples: wgpu::TextureView,
+    /// Where a pixel has several samples.
+    samples: Option<wgpu::TextureView>,
     depth: wgpu::TextureView,
     resolved: wgpu::TextureView,
 }
 
 impl Target {
-    /// A picture of `size` pixels; `old` is the one that it takes the place of.
-    pub fn new(render: &RenderState, size: [u32; 2], old: Option<&Self>) -> Self {
+    /// A picture of `size` pixels with so many `samples`; `old` is the one that it takes the place of.
+    pub fn new(render: &RenderState, size: [u32; 2], samples: u32, old: Option<&Self>) -> Self {
         let most = render.device.limits().max_texture_dimension_2d;
         let size = size.map(|pixels| pixels.clamp(1, most));
         let texture = |label, format, sample_count, usage| {
@@ -53,8 +73,8 @@ impl Target {
         Self {
             size,
             id,
-            samples: texture("samples", FORMAT, SAMPLES, drawn),
-            depth: texture("depth", DEPTH_FORMAT, SAMPLES, drawn),
+            samples: (samples > 1).then(|| texture("samples", FORMAT, samples, drawn)),
+            depth: texture("depth", DEPTH_FORMAT, samples, drawn),
             resolved,
         }
     }
@@ -72,15 +92,16 @@ impl Target {
     /// Begins to draw on an even background: red, green, blue from 0 to 1.
     pub fn pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder, background: [f32; 3]) -> wgpu::RenderPass<'a> {
         let [r, g, b] = background.map(f64::from);
+        let (view, resolve_target, store) = match &self.samples {
+            Some(samples) => (samples, Some(&self.resolved), wgpu::StoreOp::Discard),
+            None => (&self.resolved, None, wgpu::StoreOp::Store),
+        };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("view"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.samples,
-                resolve_target: Some(&self.resolved),
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                    store: wgpu::StoreOp::Discard,
-                },
+                view,
+                resolve_target,
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store },
                 depth_slice: None,
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {

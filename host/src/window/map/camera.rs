@@ -4,6 +4,7 @@
 //! That of the building, but floors may stand farther apart than they are; see [`super::Scene::shown`].
 
 use crate::building::Point;
+use crate::building::geometry::wrapped;
 use eframe::egui::{Pos2, Rect, Vec2, pos2, vec2};
 use nalgebra::{Matrix4, Vector3};
 use serde::{Deserialize, Serialize};
@@ -116,12 +117,6 @@ impl Camera {
         self.bearing = wrapped(self.bearing + f64::from(drag.x) * 0.006);
         self.elevation = (self.elevation + f64::from(drag.y) * 0.006).clamp(ELEVATION.0, ELEVATION.1);
     }
-}
-
-/// The same angle within half a turn. **Units:** rad.
-pub(in crate::window) fn wrapped(angle: f64) -> f64 {
-    use std::f64::consts::PI;
-    if angle.abs() <= PI { angle } else { (angle + PI).rem_euclid(2.0 * PI) - PI }
 }
 
 impl Sight {

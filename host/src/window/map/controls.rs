@@ -85,13 +85,18 @@ fn layers(ui: &mut Ui, view: &mut View) {
 fn floors(ui: &mut Ui, view: &mut View, scene: &Scene, level: Option<i32>, height: f32) {
     ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
     ui.with_layout(Layout::top_down(Align::Min), |ui| {
-        let rows = scene.storeys().len() as f32 + 1.0;
+        let rows = scene.storeys().len() as f32 + 2.0;
         let mut list = |ui: &mut Ui| {
             if view.projection == Projection::Orbit {
-                let all = row(ui, view.level.is_none(), "All", true).on_hover_text("Look at all floors");
-                if all.clicked() {
-                    view.level = None;
-                    view.hidden.clear();
+                for (auto, word, told) in [
+                    (true, "Auto", "Look at the floor of the person, as soon as that is known"),
+                    (false, "All", "Look at all floors"),
+                ] {
+                    let chosen = view.level.is_none() && view.auto == auto;
+                    if row(ui, chosen, word, true).on_hover_text(told).clicked() {
+                        (view.level, view.auto) = (None, auto);
+                        view.hidden.clear();
+                    }
                 }
             }
             for (index, storey) in scene.storeys().iter().enumerate().rev() {

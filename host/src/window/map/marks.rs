@@ -37,9 +37,9 @@ pub struct Cloud {
 }
 
 impl Cloud {
-    /// Sends a cloud.
-    pub fn new(render: &RenderState, particles: Arc<[Particle]>, colour: Rgb, floors: usize) -> Self {
-        let (dots, floors) = dots(&particles, colour, floors);
+    /// Sends a cloud; of more than `most` particles only every so many.
+    pub fn new(render: &RenderState, particles: Arc<[Particle]>, colour: Rgb, floors: usize, most: usize) -> Self {
+        let (dots, floors) = dots(&particles, most, colour, floors);
         let buffer = vertex_buffer(render, "particles", bytemuck::cast_slice(&dots));
         Self { particles, colour, buffer, floors }
     }
@@ -58,19 +58,22 @@ impl Cloud {
     }
 }
 
-/// Particles by floor, and where each floor begins and ends. One on a floor that is not there is left out.
-fn dots(particles: &[Particle], colour: Rgb, floors: usize) -> (Vec<Dot>, Vec<Range<u32>>) {
+/// Particles by floor, at most so many, and where each floor begins and ends. One on a floor that is not there is left out.
+fn dots(particles: &[Particle], most: usize, colour: Rgb, floors: usize) -> (Vec<Dot>, Vec<Range<u32>>) {
+    // Neighbours in the cloud were copies of one; every so many are as good a picture of it.
+    let step = particles.len().div_ceil(most.max(1)).max(1);
+    let drawn = || particles.iter().step_by(step);
     let mut counts = vec![0_u32; floors + 1];
     let floor = |particle: &Particle| usize::from(particle.floor).min(floors);
-    for particle in particles {
+    for particle in drawn() {
         counts[floor(particle)] += 1;
     }
     let mut next = 0;
     let ranges: Vec<Range<u32>> = counts.iter().map(|count| (next..next + count, next += count).0).collect();
     let mut free: Vec<u32> = ranges.iter().map(|range| range.start).collect();
     let mean = particles.iter().map(|particle| particle.weight).sum::<f32>() / particles.len().max(1) as f32;
-    let mut dots = vec![[0; 4]; particles.len()];
-    for particle in particles {
+    let mut dots = vec![[0; 4]; particles.len().div_ceil(step)];
+    for particle in drawn() {
         let share = if mean > 0.0 { particle.weight / mean } else { 1.0 };
         let opacity = FAINTEST + (1.0 - FAINTEST) * share.sqrt().min(1.0);
         let place = &mut free[floor(particle)];
@@ -194,12 +197,25 @@ mod tests {
     fn particles_are_sorted_by_floor_and_fainter_with_less_weight() {
         let particle = |floor, x, weight| Particle { x, floor, weight, ..Particle::default() };
         let particles = [particle(1, 1.0, 1.0), particle(0, 2.0, 0.01), particle(1, 3.0, 1.0), particle(7, 4.0, 1.0)];
-        let (dots, floors) = dots(&particles, [1, 2, 3], 2);
+        let (dots, floors) = dots(&particles, usize::MAX, [1, 2, 3], 2);
         assert_eq!(floors, [0..1, 1..3]);
         let places: Vec<f32> = dots.iter().map(|dot| f32::from_bits(dot[0])).collect();
         assert_eq!(places, [2.0, 1.0, 3.0, 4.0]);
         let opacity = |dot: &Dot| dot[3].to_le_bytes()[3];
         assert!(opacity(&dots[0]) < opacity(&dots[1]));
+    }
+
+    #[test]
+    fn of_a_crowd_only_so_many_are_drawn_from_all_of_it() {
+        let crowd: Vec<Particle> =
+            (0..1_001).map(|index| Particle { x: index as f32, weight: 1.0, ..Particle::default() }).collect();
+        for (most, count) in [(usize::MAX, 1_001), (1_001, 1_001), (1_000, 501), (10, 10), (1, 1), (0, 1)] {
+            let (dots, floors) = dots(&crowd, most, [1, 2, 3], 1);
+            assert_eq!((dots.len(), floors[0].end as usize), (count, count), "{most}");
+        }
+        let (dots, _) = dots(&crowd, 10, [1, 2, 3], 1);
+        let farthest = dots.iter().map(|dot| f32::from_bits(dot[0])).fold(0.0, f32::max);
+        assert!(farthest > 900.0);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Of each kind so many frames are drawn; the one in the middle counts.
-const FRAMES: usize = 9;
+const FRAMES: usize = 7;
 /// Corners of the path that is drawn too.
 const CORNERS: u32 = 2_000;
 
@@ -74,7 +74,7 @@ struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     fn new(studio: &'a mut Studio, sheet: Sheet, scene: Arc<Scene>) -> Self {
-        let map = Map::new(studio.render());
+        let map = Map::quick(studio.render());
         Self { studio, sheet, map, view: View::default(), scene, overlay: Overlay::default() }
     }
 

@@ -6,7 +6,7 @@ use super::overlay::Overlay;
 use super::palette::{Palette, shares};
 use super::scene::Scene;
 use super::view::Layers;
-use crate::window::gpu::{Blend, Depth, Kind, Pipelines, RenderState, Target, uniform};
+use crate::window::gpu::{Blend, Care, Depth, Kind, Pipelines, RenderState, Target, uniform};
 use eframe::egui::TextureId;
 use eframe::wgpu::{self, util::DeviceExt};
 use std::num::NonZeroU64;
@@ -72,6 +72,7 @@ struct SceneBuffers {
 /// The painter of one map.
 pub struct Painter {
     render: RenderState,
+    care: Care,
     globals: wgpu::Buffer,
     storeys: Option<(usize, wgpu::Buffer, wgpu::BindGroup)>,
     ways: Ways,
@@ -101,8 +102,8 @@ impl std::fmt::Debug for Painter {
     }
 }
 
-fn pipelines(render: &RenderState) -> Pipelines<'_> {
-    Pipelines::of(render, "map", include_str!("map.wgsl"), Some(STOREY))
+fn pipelines(render: &RenderState, care: Care) -> Pipelines<'_> {
+    Pipelines::of(render, "map", include_str!("map.wgsl"), Some(STOREY), care.samples)
 }
 
 impl Ways {
@@ -129,12 +130,13 @@ impl Ways {
 
 impl Painter {
     /// A painter with nothing to draw yet.
-    pub fn new(render: &RenderState) -> Self {
+    pub fn new(render: &RenderState, care: Care) -> Self {
         Self {
             render: render.clone(),
+            care,
             globals: uniform(render, "map", (GLOBALS * 4) as u64),
             storeys: None,
-            ways: Ways::of(&pipelines(render)),
+            ways: Ways::of(&pipelines(render, care)),
             scene: None,
             clouds: Vec::new(),
             strokes: Strokes::default(),
@@ -152,12 +154,12 @@ impl Painter {
             Some(target) if target.size() == size => target,
             old => {
                 self.drawn = None;
-                Target::new(&self.render, size, old.as_ref())
+                Target::new(&self.render, size, self.care.samples, old.as_ref())
             }
         };
         self.send(scene, overlay, look.palette);
         let drawn = Drawn {
-            globals: globals(scene, overlay, look, target.size()),
+            globals: globals(scene, overlay, look, self.care, target.size()),
             storeys: storeys(scene, look),
             layers: look.layers,
             size: target.size(),
@@ -189,7 +191,7 @@ impl Painter {
             self.scene = Some(SceneBuffers { scene: scene.clone(), vertices, indices });
             let count = scene.storeys().len().max(1);
             let blocks = uniform(&self.render, "storeys", u64::from(STEP) * count as u64);
-            let group = pipelines(&self.render).group(&self.globals, Some((&blocks, STOREY)));
+            let group = pipelines(&self.render, self.care).group(&self.globals, Some((&blocks, STOREY)));
             self.storeys = Some((count, blocks, group));
         }
         let mut changed = fresh;
@@ -199,7 +201,8 @@ impl Painter {
             if self.clouds.get(index).is_some_and(|known| !fresh && known.is_of(&cloud.particles, colour)) {
                 continue;
             }
-            let sent = Cloud::new(&self.render, cloud.particles.clone(), colour, scene.storeys().len());
+            let floors = scene.storeys().len();
+            let sent = Cloud::new(&self.render, cloud.particles.clone(), colour, floors, self.care.particles);
             if index < self.clouds.len() {
                 self.clouds[index] = sent
             } else {
@@ -254,8 +257,8 @@ impl Painter {
 }
 
 /// The block that is the same for everything.
-fn globals(scene: &Scene, overlay: &Overlay, look: &Look<'_>, size: [u32; 2]) -> Vec<f32> {
-    let particles: usize = overlay.clouds.iter().map(|cloud| cloud.particles.len()).sum();
+fn globals(scene: &Scene, overlay: &Overlay, look: &Look<'_>, care: Care, size: [u32; 2]) -> Vec<f32> {
+    let particles: usize = overlay.clouds.iter().map(|cloud| cloud.particles.len().min(care.particles)).sum();
     // Where there are many, the plan below them is to be seen too.
     let opacity = 0.85 * (MANY / particles.max(1) as f32).sqrt().clamp(0.25, 1.0);
     let [low, high] = scene.bounds();

@@ -71,6 +71,8 @@ pub struct View {
     /// Number of the floor that is looked at: the only one of a flat map, and in perspective the highest that is not
     /// only hinted at. Nothing for all floors.
     pub level: Option<i32>,
+    /// As long as no floor is chosen, those above the person, or the likeliest place, are only hinted at.
+    pub auto: bool,
     /// How many times as far as in truth floors stand apart.
     pub spread: f64,
     /// Whether the map goes with the selected person.
@@ -86,6 +88,7 @@ impl Default for View {
             camera: None,
             hidden: BTreeSet::new(),
             level: None,
+            auto: true,
             spread: 1.0,
             follow: false,
             layers: Layers::default(),

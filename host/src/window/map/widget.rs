@@ -9,7 +9,7 @@ use super::scene::{Place, Scene};
 use super::view::{SPREAD, View};
 use super::{controls, gauges, keys, lettering, pins, pointer};
 use crate::building::Point;
-use crate::window::gpu::RenderState;
+use crate::window::gpu::{Care, RenderState};
 use eframe::egui::{self, Color32, Rect, Sense, Ui, WidgetInfo, WidgetType, pos2};
 use std::sync::Arc;
 
@@ -22,6 +22,9 @@ const HINTED: Opacity = Opacity { ground: 0.05, walls: 0.09, marks: 0.3 };
 const WHOLE: Opacity = Opacity { ground: 1.0, walls: 1.0, marks: 1.0 };
 /// How fast the camera comes to where it is sent: the share of the way left after this time is 1/e. **Units:** s.
 const GLIDE_S: f64 = 0.09;
+
+/// Before it is known where somebody is, the floor of a place that is likelier than this is looked at.
+const LIKELY: f64 = 0.8;
 
 /// What was pointed at.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -80,9 +83,18 @@ impl Scenery<'_> {
 }
 
 impl Map {
-    /// A map that draws with this.
+    /// A map that draws with this, as well as it can.
     pub fn new(render: &RenderState) -> Self {
-        Self { painter: Painter::new(render), goal: None, shown: None, ruler: Ruler::default(), picked: None }
+        Self::with(render, Care::BEST)
+    }
+
+    /// A map that moves with ease, also where there is no graphics card.
+    pub fn quick(render: &RenderState) -> Self {
+        Self::with(render, Care::quick(render))
+    }
+
+    fn with(render: &RenderState, care: Care) -> Self {
+        Self { painter: Painter::new(render, care), goal: None, shown: None, ruler: Ruler::default(), picked: None }
     }
 
     /// Shows all of the building, or all of the walk where there is none.
@@ -258,10 +270,12 @@ pub(super) fn followed(overlay: &Overlay) -> Option<&Person> {
 fn level(view: &View, scene: &Scene, overlay: &Overlay) -> Option<i32> {
     let there = |number: &i32| scene.storey(*number).is_some();
     let asked = view.level.filter(there);
+    let likeliest =
+        overlay.clusters.first().filter(|cluster| cluster.probability > LIKELY).map(|cluster| cluster.floor);
+    let person = followed(overlay).map(|person| person.floor).or(likeliest).filter(there);
     if view.projection == Projection::Orbit {
-        return asked;
+        return asked.or(person.filter(|_| view.auto));
     }
-    let person = followed(overlay).map(|person| person.floor).filter(there);
     let ground = Some(0).filter(there).or(scene.storeys().first().map(|storey| storey.number));
     asked.or(person).or(ground)
 }
