@@ -68,58 +68,78 @@ struct Free<'a> {
     floor: &'a Floor,
 }
 
-/// The pieces of a way through `stops`: names of rooms (`101`, or with the floor's name before them, `F1/101`), and between
-/// them `stairs`, `ramp`, `elevator` or the name of a connector where the way is to change floors by it.
+/// The pieces of a way through `stops`: as [`Planner::plan`], for one way.
 ///
 /// # Errors
-/// When a name is not known, or no way leads to a stop.
+/// As [`Planner::plan`].
 pub fn plan(building: &Building, stops: &[&str]) -> Result<Vec<Piece>, Error> {
-    let stops = stops.iter().map(|name| stop(building, name)).collect::<Result<Vec<_>, _>>()?;
-    let free: Vec<Free<'_>> = building.floors.iter().map(|floor| Free::new(building, floor)).collect();
-    let mut pieces = Vec::new();
-    let mut here: Option<(i32, Point)> = None;
-    let (mut kind, mut through) = (None, None);
-    for stop in stops {
-        match stop {
-            Stop::By(wanted) => kind = Some(wanted),
-            Stop::Through(name) => through = Some(name),
-            Stop::Place(floor, place) => {
-                let wanted = Wanted { kind: kind.take(), name: through.take() };
-                match here {
-                    None => pieces.push(Piece::Walk { floor, points: vec![place] }),
-                    Some(from) => pieces.extend(leg(building, &free, from, (floor, place), &wanted)?),
-                }
-                here = Some((floor, place));
-            }
-        }
-    }
-    if here.is_none() {
-        return Err(Error::Model("a route needs a room to start from".to_owned()));
-    }
-    Ok(pieces)
+    Planner::new(building).plan(stops)
 }
 
-fn stop(building: &Building, name: &str) -> Result<Stop, Error> {
-    let name = name.trim();
-    if let Some(kind) = ConnectorKind::ALL.into_iter().find(|kind| kind.word() == name) {
-        return Ok(Stop::By(kind));
+/// Plans ways through a building, whose free places it knows.
+pub struct Planner<'a> {
+    building: &'a Building,
+    free: Vec<Free<'a>>,
+}
+
+impl<'a> Planner<'a> {
+    /// Looks at all floors.
+    pub fn new(building: &'a Building) -> Self {
+        Self { building, free: building.floors.iter().map(|floor| Free::new(building, floor)).collect() }
     }
-    if building.connectors.iter().any(|connector| connector.name == name) {
-        return Ok(Stop::Through(name.to_owned()));
+
+    /// The pieces of a way through `stops`: names of rooms (`101`, or with the floor's name before them, `F1/101`), and
+    /// between them `stairs`, `ramp`, `elevator` or the name of a connector where the way is to change floors by it.
+    ///
+    /// # Errors
+    /// When a name is not known, or no way leads to a stop.
+    pub fn plan(&self, stops: &[&str]) -> Result<Vec<Piece>, Error> {
+        let stops = stops.iter().map(|name| self.stop(name)).collect::<Result<Vec<_>, _>>()?;
+        let mut pieces = Vec::new();
+        let mut here: Option<(i32, Point)> = None;
+        let (mut kind, mut through) = (None, None);
+        for stop in stops {
+            match stop {
+                Stop::By(wanted) => kind = Some(wanted),
+                Stop::Through(name) => through = Some(name),
+                Stop::Place(floor, place) => {
+                    let wanted = Wanted { kind: kind.take(), name: through.take() };
+                    match here {
+                        None => pieces.push(Piece::Walk { floor, points: vec![place] }),
+                        Some(from) => pieces.extend(leg(self.building, &self.free, from, (floor, place), &wanted)?),
+                    }
+                    here = Some((floor, place));
+                }
+            }
+        }
+        if here.is_none() {
+            return Err(Error::Model("a route needs a room to start from".to_owned()));
+        }
+        Ok(pieces)
     }
-    let Some((floor, room)) = building.room(name) else {
-        let known: Vec<_> =
-            building.floors.iter().flat_map(|floor| &floor.rooms).map(|room| room.name.as_str()).take(12).collect();
-        return Err(Error::Model(format!(
-            "'{name}' is no room and no connector of the building; its rooms begin with {}",
-            known.join(", ")
-        )));
-    };
-    let free = Free::new(building, floor);
-    let middle = geometry::centre(&room.outline);
-    let place = free.nearest(middle, |point| geometry::contains(&room.outline, point));
-    let place = place.ok_or_else(|| Error::Model(format!("nobody can stand in room '{name}'")))?;
-    Ok(Stop::Place(floor.number, place))
+
+    fn stop(&self, name: &str) -> Result<Stop, Error> {
+        let (building, name) = (self.building, name.trim());
+        if let Some(kind) = ConnectorKind::ALL.into_iter().find(|kind| kind.word() == name) {
+            return Ok(Stop::By(kind));
+        }
+        if building.connectors.iter().any(|connector| connector.name == name) {
+            return Ok(Stop::Through(name.to_owned()));
+        }
+        let Some((floor, room)) = building.room(name) else {
+            let known: Vec<_> =
+                building.floors.iter().flat_map(|floor| &floor.rooms).map(|room| room.name.as_str()).take(12).collect();
+            return Err(Error::Model(format!(
+                "'{name}' is no room and no connector of the building; its rooms begin with {}",
+                known.join(", ")
+            )));
+        };
+        let middle = geometry::centre(&room.outline);
+        let free = self.free.iter().find(|free| free.floor.number == floor.number);
+        let place = free.and_then(|free| free.nearest(middle, |point| geometry::contains(&room.outline, point)));
+        let place = place.ok_or_else(|| Error::Model(format!("nobody can stand in room '{name}'")))?;
+        Ok(Stop::Place(floor.number, place))
+    }
 }
 
 /// How floors are to be changed.
