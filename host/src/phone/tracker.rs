@@ -146,20 +146,8 @@ impl PhoneTracker {
             // Of the first step of all nobody knows where in it the recording began.
             (0.5 * p.length.of(p.person_m, f64::INFINITY, bounce), 0.5)
         };
-        let along = (part * length).powi(2) + LEAST_SIGMA_M * LEAST_SIGMA_M;
-        let aside = p.aside_m * p.aside_m;
-        let tall = rise.map_or(UNKNOWN_HEIGHT_M, |_| p.barometer.sigma_m).powi(2);
-        let turned = p.turn_sigma * p.turn_sigma + (p.turn_part * turn).powi(2);
-        // Along and aside of the new direction, seen from the old one.
         let (sin, cos) = turn.sin_cos();
-        let (xx, yy) = (along * cos * cos + aside * sin * sin, along * sin * sin + aside * cos * cos);
-        let xy = (along - aside) * sin * cos;
-        let covariance = Matrix4::new(
-            xx, xy, 0.0, 0.0, //
-            xy, yy, 0.0, 0.0, //
-            0.0, 0.0, tall, 0.0, //
-            0.0, 0.0, 0.0, turned,
-        );
+        let covariance = covariance(p, length, part, turn, rise.is_some());
         let step = Step {
             index: self.count,
             stance_start: time,
@@ -175,6 +163,25 @@ impl PhoneTracker {
         self.count = self.count.wrapping_add(1);
         step
     }
+}
+
+/// How wrong a step may be (x, y, z, turn) that is so long, with a part of it unsure, and leads so far aside of the one
+/// before; and whether its rise was measured. **Units:** m, rad; **Frame:** heading frame of the previous step.
+pub(crate) fn covariance(p: &Parameters, length: f64, part: f64, turn: f64, measured: bool) -> Matrix4<f64> {
+    let along = (part * length).powi(2) + LEAST_SIGMA_M * LEAST_SIGMA_M;
+    let aside = p.aside_m * p.aside_m;
+    let tall = if measured { p.barometer.sigma_m } else { UNKNOWN_HEIGHT_M }.powi(2);
+    let turned = p.turn_sigma * p.turn_sigma + (p.turn_part * turn).powi(2);
+    // Along and aside of the new direction, seen from the old one.
+    let (sin, cos) = turn.sin_cos();
+    let (xx, yy) = (along * cos * cos + aside * sin * sin, along * sin * sin + aside * cos * cos);
+    let xy = (along - aside) * sin * cos;
+    Matrix4::new(
+        xx, xy, 0.0, 0.0, //
+        xy, yy, 0.0, 0.0, //
+        0.0, 0.0, tall, 0.0, //
+        0.0, 0.0, 0.0, turned,
+    )
 }
 
 /// All steps of a recording.

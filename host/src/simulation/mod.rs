@@ -58,6 +58,7 @@ pub mod output;
 pub mod path;
 pub mod peaks;
 pub mod person;
+pub mod phone;
 pub mod plan;
 pub mod profile;
 pub mod random;

@@ -34,6 +34,10 @@ pub enum Purpose {
     MadeUpSteps,
     /// How wide the rooms of a made-up building are.
     Rooms,
+    /// What is wrong with the steps of a phone.
+    PhoneSteps,
+    /// Where somebody goes in a building.
+    Route,
 }
 
 impl Random {
