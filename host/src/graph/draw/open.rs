@@ -36,25 +36,76 @@ pub fn net(free: &Free, sketch: &mut Sketch, open: &[bool], edge_m: f64, fork: f
             }
             next += 1;
         }
-        nodes.extend(lattice(free, sketch, open, &cells, edge_m));
+        let lines = ahead(free, sketch, &ports);
+        nodes.extend(lattice(free, sketch, open, &cells, &lines, edge_m));
     }
     for port in ports {
         join_port(free, sketch, port, &nodes, edge_m, fork);
     }
 }
 
-/// The nodes of one open area.
-fn lattice(free: &Free, sketch: &mut Sketch, open: &[bool], cells: &[usize], edge_m: f64) -> Vec<usize> {
+/// Ports: where they are, and whether their way leads into the net along its rows. **Frame:** cells.
+fn ahead(free: &Free, sketch: &Sketch, ports: &[usize]) -> Vec<(Point, bool)> {
+    let along = |&port: &usize| {
+        let here = free.to_cells(sketch.dots[port].place);
+        let before = free.to_cells(sketch.dots[*sketch.dots[port].beside.first()?].place);
+        Some((here, (here[0] - before[0]).abs() >= (here[1] - before[1]).abs()))
+    };
+    ports.iter().filter_map(along).collect()
+}
+
+/// Where the lines of a net lie between two borders: on what is `wanted`, and about `edge_m` apart between. **Units:** m.
+fn lines([low, high]: [f64; 2], mut wanted: Vec<f64>, edge_m: f64) -> Vec<f64> {
+    wanted.retain(|at| (low..=high).contains(at));
+    wanted.sort_by(f64::total_cmp);
+    let groups = wanted.chunk_by(|a, b| b - a < ONE_LINE_M);
+    let fixed: Vec<f64> = groups.map(|group| group.iter().sum::<f64>() / group.len() as f64).collect();
+    let (Some(&first), Some(&last)) = (fixed.first(), fixed.last()) else {
+        let count = ((high - low) / edge_m).round().max(1.0);
+        return (0..count as usize).map(|line| low + (line as f64 + 0.5) / count * (high - low)).collect();
+    };
+    let mut lines = Vec::new();
+    // Half a mesh is left at the borders.
+    let beside = |gap: f64| {
+        let count = (gap / edge_m - 0.5).round().max(0.0);
+        (1..=count as usize).map(move |line| line as f64 * gap / (count + 0.5))
+    };
+    lines.extend(beside(first - low).map(|off| first - off));
+    lines.reverse();
+    for pair in fixed.windows(2) {
+        let count = ((pair[1] - pair[0]) / edge_m).round().max(1.0);
+        lines.extend((0..count as usize).map(|line| pair[0] + line as f64 / count * (pair[1] - pair[0])));
+    }
+    lines.push(last);
+    lines.extend(beside(high - last).map(|off| last + off));
+    lines
+}
+
+/// Lines nearer than this become one. **Units:** m.
+const ONE_LINE_M: f64 = 1.0;
+
+/// The nodes of one open area. Its rows and columns go straight on from the ways that lead into it: who comes out of a
+/// corridor goes on as before.
+fn lattice(
+    free: &Free,
+    sketch: &mut Sketch,
+    open: &[bool],
+    cells: &[usize],
+    ahead: &[(Point, bool)],
+    edge_m: f64,
+) -> Vec<usize> {
     let Some([low, high]) = geometry::bounds(cells.iter().map(|&cell| free.middle(cell))) else { return Vec::new() };
-    let counts = [0, 1].map(|axis| ((high[axis] - low[axis]) / edge_m).round().max(1.0));
-    let pitch = [0, 1].map(|axis| (high[axis] - low[axis]) / counts[axis]);
+    let here = |place: &Point| (0..2).all(|axis| (low[axis] - edge_m..=high[axis] + edge_m).contains(&place[axis]));
+    let [columns, rows] = [0, 1].map(|axis| {
+        let into = ahead.iter().filter(|(place, along_rows)| here(place) && *along_rows == (axis == 1));
+        lines([low[axis], high[axis]], into.map(|(place, _)| place[axis]).collect(), edge_m)
+    });
     let mut nodes: BTreeMap<[i64; 2], usize> = BTreeMap::new();
-    for row in 0..counts[1] as i64 {
-        for column in 0..counts[0] as i64 {
-            let at = [low[0] + (column as f64 + 0.5) * pitch[0], low[1] + (row as f64 + 0.5) * pitch[1]];
-            let place = free.to_building(at);
+    for (row, &y) in rows.iter().enumerate() {
+        for (column, &x) in columns.iter().enumerate() {
+            let place = free.to_building([x, y]);
             if free.cell(place).is_some_and(|cell| open[cell]) {
-                nodes.insert([column, row], sketch.add(place, Hold::Loose));
+                nodes.insert([column as i64, row as i64], sketch.add(place, Hold::Loose));
             }
         }
     }
@@ -93,5 +144,25 @@ fn join_port(free: &Free, sketch: &mut Sketch, port: usize, nodes: &[usize], edg
             sketch.join(port, node);
             joined += 1;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_lie_where_they_are_wanted_and_evenly_between() {
+        assert_eq!(lines([0.0, 9.0], vec![], 2.3), [1.125, 3.375, 5.625, 7.875]);
+        // Two ways that come in beside each other are one.
+        let found = lines([0.0, 10.0], vec![5.1, 4.9, 20.0], 2.0);
+        let even = [1.0, 3.0, 5.0, 7.0, 9.0_f64];
+        assert!(
+            found.len() == 5 && found.iter().zip(even).all(|(found, even)| (found - even).abs() < 1e-9),
+            "{found:?}"
+        );
+        let found = lines([0.0, 10.0], vec![2.0, 8.0], 2.3);
+        assert!(found.windows(2).all(|pair| (1.3..=3.1).contains(&(pair[1] - pair[0]))), "{found:?}");
+        assert!(found.contains(&2.0) && found.contains(&8.0));
     }
 }
