@@ -40,6 +40,12 @@ pub enum Error {
         /// What is wrong, and its cure.
         what: String,
     },
+    /// A setting of the matcher makes no sense.
+    #[error("settings of the matcher: {0}")]
+    Setting(String),
+    /// Nobody can begin there.
+    #[error("the walk graph has no edge on floor {0}")]
+    NoFloor(i32),
     /// No way leads there.
     #[error("{0}")]
     NoWay(String),

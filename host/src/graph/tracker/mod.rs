@@ -89,6 +89,11 @@ impl<'a> Tracker<'a> {
         Self { floors: Some(floors), ..self }
     }
 
+    /// The edge, and how far along it. **Units:** m.
+    pub fn position(&self) -> (EdgeId, f64) {
+        (self.edge, self.along_m)
+    }
+
     /// Takes in a step: how the heading has changed since the last, how long the step was if that is measured, and how much
     /// higher it ends. **Units:** rad, m.
     pub fn step(&mut self, turn: f64, measured_m: f64, rise_m: f64) -> Decision {
