@@ -109,7 +109,7 @@ fn a_recorded_walk_is_followed_and_each_step_is_explained() {
     };
     let home = tempfile::tempdir().unwrap();
     let [walk, plan] = ["eight_walk", "floorplans/4OG.geojson"].map(|name| folder.join(name).display().to_string());
-    let begin = ["graph", &walk, "--building", &plan, "--start"];
+    let begin = ["graph", &walk, "--building", &plan, "--method", "documented", "--start"];
     let told = said(home.path(), &[&begin[..], &["4,76.7,33.4,-164", "--explain", "--out", "way"]].concat());
     let lines: Vec<&str> = told.lines().filter(|line| line.starts_with("step ")).collect();
     // 146 m in steps of about 0.7 m.
@@ -121,6 +121,48 @@ fn a_recorded_walk_is_followed_and_each_step_is_explained() {
     assert!(told.contains("edges chosen without a search") && told.contains("on floor 4"), "{told}");
     assert!(home.path().join("way/floor4.png").is_file());
     assert!(refused(home.path(), &[&begin[..], &["anywhere"]].concat()).contains("expected FLOOR,X,Y,HEADING_DEG"));
+}
+
+#[test]
+fn a_recorded_walk_is_matched_from_a_known_start_and_from_anywhere() {
+    let Some(folder) = recordings_dir().map(|folder| folder.join("hcu_hamburg")).filter(|folder| folder.exists())
+    else {
+        return;
+    };
+    let home = tempfile::tempdir().unwrap();
+    let [walk, plan] = ["eight_walk", "floorplans/4OG.geojson"].map(|name| folder.join(name).display().to_string());
+    let begin = ["graph", &walk, "--building", &plan, "--start"];
+    let told = said(home.path(), &[&begin[..], &["4,76.7,33.4,-164", "--explain", "--out", "way"]].concat());
+    let lines: Vec<&str> = told.lines().filter(|line| line.starts_with("step ")).collect();
+    assert!((180..=240).contains(&lines.len()), "{}", lines.len());
+    assert!(lines.iter().all(|line| line.contains(" hypotheses, loss ") && line.contains("% edge ")), "{}", lines[0]);
+    assert!(told.contains("located from step 0 on"), "{told}");
+    assert!(home.path().join("way/floor4.png").is_file());
+    // From anywhere it has several places to tell at first.
+    let told = said(home.path(), &[&begin[..], &["anywhere", "--explain"]].concat());
+    assert!(told.lines().nth(5).unwrap().ends_with("more places"), "{told}");
+    assert!(told.contains("place at the end"), "{told}");
+    std::fs::write(home.path().join("wrong.toml"), "aside_m = -1.0\n").unwrap();
+    let wrong = [&begin[..], &["anywhere", "--parameters", "wrong.toml"]].concat();
+    assert!(refused(home.path(), &wrong).contains("aside_m = -1: expected 0.05 to 20"));
+}
+
+/// In so many walks of each building; all of the suite take a minute.
+const FEW: &str = "4";
+
+#[test]
+fn the_suite_prints_the_table_that_is_kept() {
+    let recorded = recordings_dir().is_some_and(|folder| folder.join("hcu_hamburg").exists());
+    if !recorded {
+        println!("skipped: no recordings");
+        return;
+    }
+    let home = tempfile::tempdir().unwrap();
+    let arguments = ["evaluate", "--suite", "graph", "--walks", FEW, "--pictures", "drawn"];
+    let printed = said(home.path(), &arguments);
+    let kept = include_str!("../../tests/graph.txt");
+    assert_eq!(printed, kept, "if that is meant: sohle evaluate --suite graph --walks {FEW} > tests/graph.txt");
+    assert!(std::fs::read(home.path().join("drawn/graph-eight.png")).unwrap().starts_with(b"\x89PNG"));
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 use super::suite::{self as table, drawn};
 use super::{Error, parameters, print, progress};
+use crate::building::open::{Options, open};
 use crate::evaluation::building::{suite, unknown};
 use crate::evaluation::{Manifest, Perturbation, Report, Settings, evaluate};
-use crate::evaluation::{fixes, phone};
+use crate::evaluation::{fixes, graph, phone};
 use crate::{particle, toml_file};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -24,13 +25,13 @@ pub struct Args {
     /// Settings of the particle filter in place of the default
     #[arg(long, value_name = "FILE.toml", requires = "suite")]
     particle: Option<PathBuf>,
-    /// Walks from an unknown start in the suite 'building'
-    #[arg(long, value_name = "N", default_value_t = 200, requires = "suite", value_parser = some_walks)]
-    walks: usize,
+    /// Walks in each building in the suites 'building' (200 from an unknown start) and 'graph' (40)
+    #[arg(long, value_name = "N", requires = "suite", value_parser = some_walks)]
+    walks: Option<usize>,
     /// All that is random in a suite follows from it
     #[arg(long, value_name = "N", default_value_t = 1, requires = "suite")]
     seed: u64,
-    /// Draws the recorded walk of the suite 'fixes', as each method has it, into this folder
+    /// Draws the recorded walk of the suites 'fixes' and 'graph', as each method has it, into this folder
     #[arg(long, value_name = "DIR", requires = "suite")]
     pictures: Option<PathBuf>,
     /// How to print the scores
@@ -66,6 +67,9 @@ enum Suite {
     Phone,
     /// Steps with positions of another source: the document's comparison (Fix, 3.4) on a recorded walk, and simulated walks
     Fixes,
+    /// The document's comparison on walk graphs (Graph, 7.5): simulated walks of a phone in both committed buildings, and a
+    /// recorded one
+    Graph,
 }
 
 /// How the scores are printed.
@@ -131,14 +135,48 @@ const SHORT_STOPS: usize = 6;
 const LONG_STOPS: usize = 12;
 /// So often each walk with a phone is followed, each time with other random numbers.
 const PHONE_SEEDS: u64 = 5;
+/// Walks in each building.
+const UNKNOWN_WALKS: usize = 200;
+const GRAPH_WALKS: usize = 40;
+
+/// The committed buildings.
+const BUILDINGS: [(&str, &str); 2] = [("twin", "buildings/twin.geojson"), ("large", "buildings/large.geojson")];
+
+/// Simulated walks in the committed buildings, and the recorded one.
+fn graphs(args: &Args, particle: particle::Parameters) -> Result<(String, serde_json::Value), Error> {
+    let host = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let settings = graph::follow::Settings { particle, seed: args.seed, ..Default::default() };
+    let methods = graph::follow::Method::ALL.len();
+    let count = args.walks.unwrap_or(GRAPH_WALKS);
+    let bar = progress((BUILDINGS.len() * (1 + methods) * count) as u64, "walks", false);
+    let done = || bar.inc(1);
+    let mut rows = Vec::new();
+    for (name, file) in BUILDINGS {
+        let building = open(&host.parent().unwrap_or(host).join(file), &Options::default())?;
+        let site = graph::walks::Site::of(name, building)?;
+        let walks = graph::walks::random_walks(&site, count, args.seed, done)?;
+        rows.extend(graph::suite::rows(&site, &walks, &settings, done)?);
+    }
+    bar.finish_and_clear();
+    let walk = phone::walk::eight()?;
+    let comparison = graph::eight::Comparison::of(&walk)?;
+    let eight = comparison.rows(&settings)?;
+    if let Some(folder) = &args.pictures {
+        drawn::graph(&walk, &comparison, &settings, folder)?;
+    }
+    // Times differ from run to run: they are no part of what is kept.
+    eprint!("{}", table::graph_times(&rows).text());
+    let text = [table::graph_walks(&rows), table::graph_eight(&eight)].map(|table| table.text()).join("\n");
+    Ok((text, serde_json::json!({"walks": rows, "eight": eight})))
+}
 
 fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
-    if args.pictures.is_some() && which != Suite::Fixes {
-        return Err(Error::new("--pictures draws the suite 'fixes' only"));
+    if args.pictures.is_some() && !matches!(which, Suite::Fixes | Suite::Graph) {
+        return Err(Error::new("--pictures draws the suites 'fixes' and 'graph' only"));
     }
     let default = match &args.particle {
         Some(path) => toml_file::read("settings of the particle filter", path)?,
-        None if matches!(which, Suite::Phone | Suite::Fixes) => particle::Parameters::phone(),
+        None if matches!(which, Suite::Phone | Suite::Fixes | Suite::Graph) => particle::Parameters::phone(),
         None => particle::Parameters::default(),
     };
     let (mut text, json) = match which {
@@ -149,12 +187,13 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
         }
         Suite::Building => {
             let documented = particle::Parameters::documented();
-            let bar = progress(2 * 8 * args.walks as u64, "walks", false);
+            let count = args.walks.unwrap_or(UNKNOWN_WALKS);
+            let bar = progress(2 * 8 * count as u64, "walks", false);
             let done = || bar.inc(1);
             let (mut rows, mut lost) = (Vec::new(), Vec::new());
             for site in [unknown::Site::institute()?, unknown::Site::offices()?] {
-                let walks = unknown::random_walks(&site, args.walks, SHORT_STOPS, args.seed, done)?;
-                let long = unknown::random_walks(&site, args.walks, LONG_STOPS, args.seed, done)?;
+                let walks = unknown::random_walks(&site, count, SHORT_STOPS, args.seed, done)?;
+                let long = unknown::random_walks(&site, count, LONG_STOPS, args.seed, done)?;
                 for (name, parameters) in [("documented", &documented), ("default", &default)] {
                     rows.push(unknown::unknown(&site, name, parameters, &walks, done)?);
                     lost.extend(unknown::lost(&site, name, parameters, &long, done)?);
@@ -183,6 +222,7 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
             let text = [table::eight(&rows), table::walks(&walks)].map(|table| table.text()).join("\n");
             (text, serde_json::json!({"eight": rows, "walks": walks}))
         }
+        Suite::Graph => graphs(args, default)?,
     };
     if args.format == Format::Json {
         text = format!("{}\n", serde_json::to_string_pretty(&json)?);

@@ -1,4 +1,4 @@
-//! `sohle graph`: a recorded walk, forced onto the walk graph of a building as the graph document does it.
+//! `sohle graph`: a recorded walk on the walk graph of a building, with several hypotheses or as the graph document does it.
 
 use super::table::Table;
 use super::{Error, print};
@@ -6,35 +6,44 @@ use crate::building::open::{Options, open};
 use crate::building::picture::{self, Trace};
 use crate::building::{Building, geometry::Point};
 use crate::export::{file, png};
+use crate::graph::Graph;
 use crate::graph::draw::{self, draw};
+use crate::graph::matcher::{self, Estimate, Matcher};
 use crate::graph::tracker::{Case, Decision, Floors, Parameters, Tracker, start};
-use crate::graph::{Graph, NodeId};
+use crate::particle::Start;
 use crate::track::Track;
 use crate::{follow, particle, phone, recording, toml_file};
 use sohle_shared::step::Step;
 use std::path::{Path, PathBuf};
 
-/// Follows a recorded walk on the walk graph of a building, case by case as the graph document does
+/// Follows a recorded walk on the walk graph of a building
 ///
-/// On the walk graph of the building's file; one is drawn if it has none. Floors change where the edges of stairs lead, or
-/// by the heights of the steps.
+/// On the walk graph of the building's file; one is drawn if it has none. With several hypotheses, each with its
+/// probability, or case by case as the graph document does. Floors change where the edges of stairs lead, or by the heights
+/// of the steps.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164 --explain\n  \
-    sohle graph walk.mcap --building buildings/twin.geojson --start 0,26,0.3,90 --out way")]
+    sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164\n  \
+    sohle graph eight_walk/ --building 4OG.geojson --start anywhere --explain\n  \
+    sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164 --method documented --explain\n  \
+    sohle graph walk.mcap --building buildings/twin.geojson --start 0,26,0.3,90 --barometer --out way")]
 pub struct Args {
     /// The recording, of a phone or of a shoe
     file: PathBuf,
     /// The file or folder of the building
     #[arg(long, value_name = "FILE")]
     building: PathBuf,
-    /// Where the walk begins, and into which direction: FLOOR,X,Y,HEADING_DEG
+    /// Where the walk begins, and into which direction: FLOOR,X,Y,HEADING_DEG. The matcher takes 'anywhere', 'entrances', the
+    /// name of a room and FLOOR,X,Y too
     #[arg(long, value_name = "WHERE", allow_hyphen_values = true)]
     start: String,
-    /// The thresholds of the tracker; others are those of the document
+    /// Who follows
+    #[arg(long, value_enum, default_value_t = Method::Matcher)]
+    method: Method,
+    /// Settings of the method in place of its own
     #[arg(long, value_name = "FILE.toml")]
     parameters: Option<PathBuf>,
-    /// Change floors by the heights that the steps tell (a phone's barometer, a shoe), by nothing else
+    /// Change floors by the heights that the steps tell (a phone's barometer, a shoe) too; as the document does, by nothing else
     #[arg(long)]
     barometer: bool,
     /// Print for each step what was decided, and why
@@ -45,6 +54,15 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
+/// Who follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Method {
+    /// Several hypotheses with probabilities; finds itself again, needs no known start
+    Matcher,
+    /// One hypothesis, forced onto the graph case by case (Graph, chapter 6)
+    Documented,
+}
+
 /// Reads, follows, tells.
 pub fn run(args: Args) -> Result<(), Error> {
     let mut building = open(&args.building, &Options::default())?;
@@ -52,31 +70,103 @@ pub fn run(args: Args) -> Result<(), Error> {
         building.graph = Some(draw(&building, &draw::Parameters::default()));
     }
     let graph = Graph::of(&building)?;
-    let (steps, usual) = steps(&args.file)?;
+    let places = match args.method {
+        Method::Matcher => matched(&args, &building, &graph)?,
+        Method::Documented => documented(&args, &building, &graph)?,
+    };
+    if let Some(folder) = &args.out {
+        pictures(&building, &places, folder)?;
+        print(&format!("pictures in {}\n", folder.display()))?;
+    }
+    Ok(())
+}
+
+/// Follows with several hypotheses. Returns floor and place after each step.
+fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, Point)>, Error> {
+    let is_phone = phone::open::is_phone(&args.file);
+    let parameters = match &args.parameters {
+        Some(path) => toml_file::read("settings of the matcher", path)?,
+        None if is_phone => matcher::Parameters::phone(),
+        None => matcher::Parameters::default(),
+    };
+    let place = |place: particle::StartPlace| matcher::Place {
+        floor: place.floor,
+        place: place.place.map(f64::from),
+        sigma_m: f64::from(place.sigma_m),
+        heading: place.heading.map(|(heading, sigma)| (f64::from(heading), f64::from(sigma))),
+    };
+    let begin = match follow::start::parse(building, &args.start)? {
+        Start::At(places) => matcher::Start::At(places.into_iter().map(place).collect()),
+        Start::Anywhere => matcher::Start::Anywhere,
+    };
+    let mut matcher = Matcher::new(graph, &parameters, &begin)?;
+    if args.barometer {
+        matcher = matcher.with_heights();
+    }
+    let (mut places, mut located) = (Vec::new(), None);
+    for step in &steps(&args.file, &phone::Parameters::default())? {
+        let estimate = matcher.step(step);
+        if args.explain {
+            print(&format!("step {}: {estimate}\n", step.index))?;
+        }
+        if estimate.is_located() && located.is_none() {
+            located = Some(step.index);
+        }
+        places.extend(estimate.place().map(|place| (place.floor, place.position)));
+    }
+    print(&found(matcher.estimate(), located))?;
+    Ok(places)
+}
+
+/// What is known at the end.
+fn found(estimate: &Estimate, located: Option<u32>) -> String {
+    let mut table = Table::new("place at the end", &["%", "floor", "x m", "y m", "+- m", "edge"]);
+    for (number, place) in estimate.places.iter().take(MOST_TOLD).enumerate() {
+        let [x, y] = place.position;
+        let figures = [100.0 * place.probability, x, y, place.sigma_m()].map(|value| format!("{value:.2}"));
+        let [percent, x, y, sigma] = figures;
+        let cells = vec![percent, place.floor.to_string(), x, y, sigma, place.edge.0.to_string()];
+        table.row((number + 1).to_string(), cells);
+    }
+    let located = located.map_or("never located\n".to_owned(), |step| format!("located from step {step} on\n"));
+    format!("{}{located}", table.text())
+}
+
+/// Places that are told at the end.
+const MOST_TOLD: usize = 10;
+
+/// Follows as the document does. Returns floor and place after each step.
+fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, Point)>, Error> {
+    let documented = Parameters::documented();
     let parameters = match &args.parameters {
         Some(path) => toml_file::read("settings of the tracker on a graph", path)?,
-        None => usual,
+        None if phone::open::is_phone(&args.file) => documented,
+        // The foot of a shoe makes every other step, which is measured.
+        None => Parameters { step_m: 0.0, ..documented },
     };
-    let place = match follow::start::parse(&building, &args.start)? {
-        particle::Start::At(places) => places.into_iter().next().and_then(|place| Some((place, place.heading?))),
-        particle::Start::Anywhere => None,
+    let place = match follow::start::parse(building, &args.start)? {
+        Start::At(places) => places.into_iter().next().and_then(|place| Some((place, place.heading?))),
+        Start::Anywhere => None,
     };
     let Some((place, (heading, _))) = place else {
-        return Err(Error::new(format!("--start {}: expected FLOOR,X,Y,HEADING_DEG", args.start)));
+        return Err(Error::new(format!(
+            "--start {}: expected FLOOR,X,Y,HEADING_DEG (or --method matcher, which needs less)",
+            args.start
+        )));
     };
-    let begin = start(&graph, place.floor, place.place.map(f64::from), f64::from(heading));
+    let begin = start(graph, place.floor, place.place.map(f64::from), f64::from(heading));
     let Some((edge, along_m)) = begin else {
         return Err(Error::new(format!("--start {}: the walk graph has no edge on floor {}", args.start, place.floor)));
     };
-    let mut tracker = Tracker::new(&graph, &parameters, edge, along_m);
+    let mut tracker = Tracker::new(graph, &parameters, edge, along_m);
     if args.barometer {
         // The start was found on this floor.
         let floors =
-            Floors::new(&building, place.floor).ok_or_else(|| Error::new(format!("no floor {}", place.floor)))?;
+            Floors::new(building, place.floor).ok_or_else(|| Error::new(format!("no floor {}", place.floor)))?;
         tracker = tracker.with_barometer(floors);
     }
     let mut decisions = Vec::new();
-    for step in &steps {
+    for step in &steps(&args.file, &phone::Parameters::documented())? {
         let rise = f64::from(step.displacement.z);
         let decision = tracker.step(f64::from(step.turn), f64::from(step.length()), rise);
         if args.explain {
@@ -84,25 +174,18 @@ pub fn run(args: Args) -> Result<(), Error> {
         }
         decisions.push(decision);
     }
-    print(&summary(&graph, &decisions))?;
-    if let Some(folder) = &args.out {
-        pictures(&building, &graph, &decisions, folder)?;
-        print(&format!("pictures in {}\n", folder.display()))?;
-    }
-    Ok(())
+    print(&summary(graph, &decisions))?;
+    let floor_of = |decision: &Decision| graph.node(graph.edge(decision.edge).from).floor;
+    Ok(decisions.iter().map(|decision| (floor_of(decision), decision.place)).collect())
 }
 
-/// The steps of a recording, and the settings for their source: the foot of a shoe makes every other step, which is measured.
-fn steps(file: &Path) -> Result<(Vec<Step>, Parameters), Error> {
-    let documented = Parameters::documented();
+/// The steps of a recording.
+fn steps(file: &Path, phone: &phone::Parameters) -> Result<Vec<Step>, Error> {
     if phone::open::is_phone(file) {
-        let samples = phone::open::open(file)?.samples;
-        return Ok((phone::steps(&samples, &phone::Parameters::documented()), documented));
+        return Ok(phone::steps(&phone::open::open(file)?.samples, phone));
     }
     let recording = recording::open(file, None)?;
-    let settings = sohle_shared::tracker::Parameters::default();
-    let track = Track::of(recording.samples.iter().copied(), &settings);
-    Ok((track.steps, Parameters { step_m: 0.0, ..documented }))
+    Ok(Track::of(recording.samples.iter().copied(), &sohle_shared::tracker::Parameters::default()).steps)
 }
 
 /// How often each case was decided, and where the walk ends.
@@ -142,16 +225,15 @@ fn summary(graph: &Graph, decisions: &[Decision]) -> String {
 }
 
 /// The floors of the walk, with its positions on them.
-fn pictures(building: &Building, graph: &Graph, decisions: &[Decision], folder: &Path) -> Result<(), Error> {
+fn pictures(building: &Building, places: &[(i32, Point)], folder: &Path) -> Result<(), Error> {
     file::folder(folder)?;
-    let floor_of = |node: NodeId| graph.node(node).floor;
     for floor in &building.floors {
-        let here = decisions.iter().filter(|decision| floor_of(graph.edge(decision.edge).from) == floor.number);
-        let places: Vec<Point> = here.map(|decision| decision.place).collect();
-        if places.is_empty() {
+        let stays = places.chunk_by(|a, b| a.0 == b.0).filter(|stay| stay[0].0 == floor.number);
+        let pieces: Vec<Vec<Point>> = stays.map(|stay| stay.iter().map(|(_, place)| *place).collect()).collect();
+        if pieces.is_empty() {
             continue;
         }
-        let trace = Trace { label: "on the graph", colour: "#c8322d", width: 2.5, pieces: vec![places] };
+        let trace = Trace { label: "on the graph", colour: "#c8322d", width: 2.5, pieces };
         let drawing = picture::draw_with(building, floor, &[], &[], &[trace]);
         file::write(&folder.join(format!("floor{}.svg", floor.number)), drawing.as_bytes())?;
         file::write(&folder.join(format!("floor{}.png", floor.number)), &png::render(&drawing)?)?;

@@ -6,6 +6,7 @@ use super::table::Table;
 use crate::evaluation::building::suite::{Errors, KnownRow, OtherRow};
 use crate::evaluation::building::unknown::{LostRow, UnknownRow};
 use crate::evaluation::fixes::{Bounds, Figures, eight, walks};
+use crate::evaluation::graph;
 use crate::evaluation::phone::suite::Row;
 
 fn metres(errors: &Errors) -> String {
@@ -231,6 +232,58 @@ pub fn walks(rows: &[walks::Row]) -> Table {
                 format!("{:.1}", row.others_doubted_percent),
             ],
         );
+    }
+    table
+}
+
+/// The methods on a walk graph and beside it, on simulated walks (Graph, 7.2 and 7.5).
+pub fn graph_walks(rows: &[graph::suite::Row]) -> Table {
+    let headings = [
+        "building",
+        "walks",
+        "end right %",
+        "without search %",
+        "floor changes",
+        "right %",
+        "RMSE m",
+        "median m",
+        "95 % m",
+    ];
+    let mut table = Table::new("phone, simulated walks", &headings);
+    for row in rows {
+        table.row(
+            row.method,
+            vec![
+                row.site.to_owned(),
+                row.walks.to_string(),
+                format!("{:.1}", row.end_right_percent),
+                row.without_search_percent.map_or_else(|| "-".to_owned(), |percent| format!("{percent:.1}")),
+                row.changes.to_string(),
+                format!("{:.1}", row.changes_right_percent),
+                format!("{:.2}", row.rmse_m),
+                format!("{:.2}", row.median_m),
+                format!("{:.2}", row.p95_m),
+            ],
+        );
+    }
+    table
+}
+
+/// The same on the recorded walk, at its way-points.
+pub fn graph_eight(rows: &[graph::eight::Row]) -> Table {
+    let mut table = Table::new("hcu eight, at way-points", &["step length", "RMSE m", "worst m"]);
+    for row in rows {
+        let figures = [row.rmse_m, row.worst_m].map(|metres| format!("{metres:.2}"));
+        table.row(row.method, [vec![row.steps.to_owned()], figures.to_vec()].concat());
+    }
+    table
+}
+
+/// What a step took on this machine. Not part of what is kept.
+pub fn graph_times(rows: &[graph::suite::Row]) -> Table {
+    let mut table = Table::new("time of a step", &["building", "us"]);
+    for row in rows {
+        table.row(row.method, vec![row.site.to_owned(), format!("{:.1}", row.step_us)]);
     }
     table
 }

@@ -7,6 +7,7 @@ pub mod alignment;
 pub mod building;
 pub mod endurance;
 pub mod fixes;
+pub mod graph;
 pub mod group;
 pub mod loading;
 pub mod manifest;

@@ -3,6 +3,8 @@
 use crate::building::picture::{Dots, Trace, draw_with};
 use crate::cli::Error;
 use crate::evaluation::fixes::eight::Comparison;
+use crate::evaluation::graph::eight;
+use crate::evaluation::graph::follow::{Method, Settings};
 use crate::evaluation::phone::walk::PhoneWalk;
 use crate::export::{file, png};
 use std::path::Path;
@@ -28,6 +30,36 @@ pub fn fixes(walk: &PhoneWalk, comparison: &Comparison<'_>, folder: &Path) -> Re
         file::write(&folder.join(format!("{name}.svg")), drawing.as_bytes())?;
         file::write(&folder.join(format!("{name}.png")), &png::render(&drawing)?)?;
     }
+    Ok(())
+}
+
+/// The recorded walk on its floor and its graph, as each method has it (Graph, 7.5).
+pub fn graph(
+    walk: &PhoneWalk,
+    comparison: &eight::Comparison<'_>,
+    settings: &Settings,
+    folder: &Path,
+) -> Result<(), Error> {
+    let building = comparison.building();
+    let Some(floor) = building.floor(walk.floor) else { return Ok(()) };
+    let lines = [
+        (Method::DeadReckoning, eight::DOCUMENTED, "#b07f3f", 1.2),
+        (Method::Documented, eight::DOCUMENTED, "#c8322d", 1.6),
+        (Method::Particles, eight::MEASURED, "#8a3fb0", 1.6),
+        (Method::Matcher, eight::MEASURED, "#2456b4", 2.4),
+    ];
+    let mut traces = Vec::new();
+    for (method, length, colour, width) in lines {
+        let path = comparison.path(method, length, settings)?.unwrap_or_default();
+        let places: Vec<_> = path.0.iter().map(|&(_, place)| place).collect();
+        traces.push(Trace { label: method.word(), colour, width, pieces: vec![places] });
+    }
+    let surveyed = walk.way_points.iter().map(|point| point.place).collect();
+    let dots = Dots { label: "way-points", colour: "#20242a", places: surveyed };
+    let drawing = draw_with(building, floor, &[], &[dots], &traces);
+    file::folder(folder)?;
+    file::write(&folder.join("graph-eight.svg"), drawing.as_bytes())?;
+    file::write(&folder.join("graph-eight.png"), &png::render(&drawing)?)?;
     Ok(())
 }
 
