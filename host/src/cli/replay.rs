@@ -101,7 +101,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let walk = shown::Walk {
         profile,
         tracker: settings.first().map(|settings| settings.parameters).unwrap_or_default(),
-        calibration: calibration.clone(),
+        calibration,
         ..shown::Walk::of(file, following.as_ref())
     };
     let recording = Report {

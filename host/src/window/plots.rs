@@ -37,6 +37,9 @@ pub fn show(ui: &mut Ui, number: usize, plot: &mut Plot, snapshot: &Snapshot, as
             ui.label(RichText::new(format!("{name} {value} {unit}")).color(colour(index)).small());
         }
     });
+    if snapshot.signals.span().is_some() && !plot.signals.iter().any(|signal| snapshot.signals.knows(*signal)) {
+        ui.label(RichText::new("Nothing of this is told here; 'Signals' has what is.").weak());
+    }
     let all = ui.data_mut(|data| data.remove_temp::<bool>(ui.id().with(("all", number)))).unwrap_or_default();
     let size = ui.available_size();
     if size.x < 40.0 || size.y < 40.0 {

@@ -130,9 +130,8 @@ impl Shoes {
 
     /// Selects the one whose person this is in what was drawn.
     pub fn select_person(&mut self, person: usize) {
-        let owners =
-            self.neighbours().flat_map(|(index, shoe)| shoe.snapshot.overlay.people.iter().map(move |_| index));
-        let owner = owners.skip(person).next();
+        let owners = |(index, shoe): (usize, &Shoe)| std::iter::repeat_n(index, shoe.snapshot.overlay.people.len());
+        let owner = self.neighbours().flat_map(owners).nth(person);
         self.selected = owner.unwrap_or(self.selected);
     }
 
