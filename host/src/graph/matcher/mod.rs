@@ -9,9 +9,11 @@
 //! the same place on the same way the likeliest is kept, and those that are hopeless are given up: their number is that of
 //! the places that are possible. When none fits any more, new ones are sown around.
 //!
-//! Nothing is drawn at random: equal steps give equal results. It costs some tens of microseconds a step while few places
-//! are possible, whatever the size of the graph. From an unknown start it looks at all ways at first: a step costs about a
-//! microsecond for each directed edge, until the first turns have left few of them.
+//! Nothing is drawn at random: equal steps give equal results. A step costs about a quarter of a millisecond while few places
+//! are possible, whatever the size of the graph: only ways that can have been reached are looked at. From an unknown start
+//! it looks at all ways at first, which takes some 50 microseconds for each directed edge and step, until the first turns
+//! have left few of them. Where many places look alike an unknown start is not always found, and a wrong place may be told
+//! with confidence until it no longer fits: the particle filter knows walls and is better at it.
 //!
 //! # Source
 //! Graph, 7.2 and 7.5, for what the document's tracker lacks. Multiple hypotheses: Reid, An Algorithm for Tracking Multiple
@@ -19,7 +21,7 @@
 //!
 //! # Example
 //! ```
-//! use sohle::building::{Building, Node, WalkGraph};
+//! use sohle::building::{Node, WalkGraph};
 //! use sohle::graph::Graph;
 //! use sohle::graph::matcher::{Matcher, Parameters, Place, Start};
 //!
