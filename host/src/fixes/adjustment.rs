@@ -7,15 +7,14 @@
 //! Fix, 2.2 (2.16 - 2.18) and 3.3. The normal matrix of (2.18) has three diagonals, and a border where `Phi0` is estimated
 //! together with the places: it is solved from its beginning to its end, without an inverse.
 
-use super::beginning::{Beginning, Waiting};
-use super::fix::Measured;
+use super::aligner::Aligner;
+use super::beginning::Waiting;
 use super::method::{Estimate, Method, Start};
 use super::observation::Observation;
 use super::parameters::Documented;
-use super::polar::{Polar, Polars};
+use super::polar::Polar;
 use nalgebra::{Matrix2, Vector2};
 use sohle_shared::step::Step;
-use sohle_shared::time::Micros;
 
 /// Adjustments of the direction; each brings it some digits nearer.
 const MOST_ROUNDS: usize = 20;
@@ -36,13 +35,11 @@ struct Node {
 #[derive(Clone, Debug)]
 pub struct Adjustment {
     parameters: Documented,
-    polars: Polars,
-    phi0: Result<f64, Beginning>,
+    aligner: Aligner,
     /// `Phi0` is estimated with the places.
     estimated: bool,
     /// The known start and its standard deviation.
     start: Option<(Vector2<f64>, f64)>,
-    time: Micros,
     nodes: Vec<Node>,
     covariance: Matrix2<f64>,
 }
@@ -51,45 +48,36 @@ impl Adjustment {
     /// Begins. A start direction is believed; without one it is estimated from the first positions, and then adjusted.
     pub fn new(parameters: &Documented, start: &Start) -> Self {
         let node = Node { polar: Polar::default(), fix: None, place: Vector2::zeros() };
-        let beginning = || Beginning::new(start.place.map(|(place, _)| place));
         Self {
             parameters: *parameters,
-            polars: Polars::default(),
-            phi0: start.direction.map(|(phi0, _)| phi0).ok_or_else(beginning),
+            aligner: Aligner::new(parameters, start),
             estimated: start.direction.is_none(),
             start: start.place.map(|(place, sigma)| (Vector2::from(place), sigma)),
-            time: Micros(0),
             nodes: vec![Node { place: start.place.map_or_else(Vector2::zeros, |(place, _)| place.into()), ..node }],
             covariance: start.place.map_or_else(Matrix2::zeros, |(_, sigma)| Matrix2::identity() * (sigma * sigma)),
         }
     }
 
     fn take(&mut self, next: Waiting) {
-        match (&mut self.phi0, next) {
-            (Ok(phi0), Waiting::Step(polar)) => {
-                let place = self.nodes[self.nodes.len() - 1].place + Vector2::from(polar.along(*phi0));
+        let last = self.nodes.len() - 1;
+        match (next, self.aligner.phi0()) {
+            (Waiting::Step(polar), Some(phi0)) => {
+                let place = self.nodes[last].place + Vector2::from(polar.along(phi0));
                 self.nodes.push(Node { polar, fix: None, place });
                 self.covariance += Matrix2::identity() * self.parameters.step_sigma_m.powi(2);
             }
-            (Ok(_), Waiting::Fix(place)) => {
-                let last = self.nodes.len() - 1;
+            (Waiting::Fix(place), _) => {
                 let (mean, count) = self.nodes[last].fix.unwrap_or((Vector2::zeros(), 0.0));
                 self.nodes[last].fix = Some(((mean * count + Vector2::from(place)) / (count + 1.0), count + 1.0));
                 self.adjust();
             }
-            (Err(beginning), next) => {
-                beginning.push(next);
-                let Some(phi0) = beginning.direction(self.parameters.spread_m) else { return };
-                if let Err(beginning) = std::mem::replace(&mut self.phi0, Ok(phi0)) {
-                    beginning.into_waiting().into_iter().for_each(|waiting| self.take(waiting));
-                }
-            }
+            (Waiting::Step(_), None) => {}
         }
     }
 
     /// (2.18) for all nodes, and for `Phi0` if it is estimated.
     fn adjust(&mut self) {
-        let Ok(mut phi0) = self.phi0 else { return };
+        let Some(mut phi0) = self.aligner.phi0() else { return };
         for _ in 0..MOST_ROUNDS {
             let normal = Normal::of(&self.nodes, self.start, phi0, &self.parameters);
             let solved = normal.solve(self.estimated);
@@ -102,12 +90,12 @@ impl Adjustment {
                 break;
             }
         }
-        self.phi0 = Ok(phi0);
+        self.aligner.set_phi0(phi0);
     }
 
     /// The start direction, as it was given or found. **Units:** rad.
     pub fn direction(&self) -> Option<f64> {
-        self.phi0.as_ref().ok().copied()
+        self.aligner.phi0()
     }
 
     /// All places as they are adjusted now: that of the start, then one for each step. **Units:** m; **Frame:** building.
@@ -236,37 +224,26 @@ impl Normal {
 
 impl Method for Adjustment {
     fn step(&mut self, step: &Step) {
-        if let Some(polar) = self.polars.next(step) {
-            self.time = step.stance_end;
-            self.take(Waiting::Step(polar));
-        }
+        self.aligner.step(step).into_iter().for_each(|next| self.take(next));
     }
 
     fn observe(&mut self, observation: &Observation) {
-        if let Measured::Position { place, .. } = observation.measured {
-            self.take(Waiting::Fix(place));
-        }
+        self.aligner.observe(observation).into_iter().for_each(|next| self.take(next));
     }
 
     fn estimate(&self) -> Option<Estimate> {
-        match &self.phi0 {
-            Ok(_) => {
-                let known = self.start.is_some() || self.nodes.iter().any(|node| node.fix.is_some());
-                let place = self.nodes[self.nodes.len() - 1].place.into();
-                known.then_some(Estimate { time: self.time, place, covariance: self.covariance })
-            }
-            Err(beginning) => {
-                beginning.last().map(|place| Estimate::of_fix(self.time, place, self.parameters.fix_sigma_m))
-            }
-        }
+        let known = self.start.is_some() || self.nodes.iter().any(|node| node.fix.is_some());
+        let place = self.nodes[self.nodes.len() - 1].place.into();
+        self.aligner.estimate(known.then_some((place, self.covariance)))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::polar::tests::step;
+    use super::super::polar::{Polars, tests::step};
     use super::*;
     use nalgebra::{SMatrix, SVector};
+    use sohle_shared::time::Micros;
 
     const STEPS: usize = 48;
     /// Two coordinates of the start and of each step, and `Phi0`.

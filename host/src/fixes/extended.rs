@@ -5,25 +5,23 @@
 //! `f(x, w) = (x + s L cos(phi + R), y + s L sin(phi + R), phi, s) + C w`, where `w` is what the step is wrong by along and
 //! across its direction.
 
-use super::beginning::{Beginning, Waiting};
-use super::fix::Measured;
+use super::aligner::Aligner;
+use super::beginning::Waiting;
 use super::method::{Estimate, Method, Start};
 use super::observation::Observation;
 use super::parameters::Documented;
-use super::polar::{Polar, Polars};
+use super::polar::Polar;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2, Vector4};
 use sohle_shared::step::Step;
-use sohle_shared::time::Micros;
 
 /// The filter: `(x, y, phi, s)`.
 #[derive(Clone, Debug)]
 pub struct Extended {
     parameters: Documented,
-    polars: Polars,
-    /// The start direction and its standard deviation, as it was given or found.
-    phi0: Result<(f64, f64), Beginning>,
+    aligner: Aligner,
+    /// How well the start direction is known, as it was given or found (standard deviation). **Units:** rad.
+    direction_sigma: f64,
     start: Option<([f64; 2], f64)>,
-    time: Micros,
     state: Option<(Vector4<f64>, Matrix4<f64>)>,
 }
 
@@ -32,22 +30,21 @@ impl Extended {
     pub fn new(parameters: &Documented, start: &Start) -> Self {
         let mut filter = Self {
             parameters: *parameters,
-            polars: Polars::default(),
-            phi0: start.direction.ok_or_else(|| Beginning::new(start.place.map(|(place, _)| place))),
+            aligner: Aligner::new(parameters, start),
+            direction_sigma: start.direction.map_or(parameters.direction_sigma, |(_, sigma)| sigma),
             start: start.place,
-            time: Micros(0),
             state: None,
         };
         filter.begin();
         filter
     }
 
-    /// The state at the start, if place and direction are known.
+    /// The state at the start, as soon as place and direction are known.
     fn begin(&mut self) {
-        if let (Ok((phi, phi_sigma)), Some((place, sigma))) = (&self.phi0, self.start) {
-            let sigmas = Vector4::new(sigma, sigma, *phi_sigma, self.parameters.scale_sigma);
+        if let (None, Some(phi), Some((place, sigma))) = (self.state, self.aligner.phi0(), self.start) {
+            let sigmas = Vector4::new(sigma, sigma, self.direction_sigma, self.parameters.scale_sigma);
             let covariance = Matrix4::from_diagonal(&sigmas.component_mul(&sigmas));
-            self.state = Some((Vector4::new(place[0], place[1], *phi, 1.0), covariance));
+            self.state = Some((Vector4::new(place[0], place[1], phi, 1.0), covariance));
         }
     }
 
@@ -79,18 +76,10 @@ impl Extended {
     }
 
     fn take(&mut self, next: Waiting) {
-        match (&mut self.phi0, next) {
-            (Ok(_), Waiting::Step(polar)) => self.predict(polar),
-            (Ok(_), Waiting::Fix(place)) => self.update(place),
-            (Err(beginning), next) => {
-                beginning.push(next);
-                let Some(phi0) = beginning.direction(self.parameters.spread_m) else { return };
-                let found = Ok((phi0, self.parameters.direction_sigma));
-                if let Err(beginning) = std::mem::replace(&mut self.phi0, found) {
-                    self.begin();
-                    beginning.into_waiting().into_iter().for_each(|waiting| self.take(waiting));
-                }
-            }
+        self.begin();
+        match next {
+            Waiting::Step(polar) => self.predict(polar),
+            Waiting::Fix(place) => self.update(place),
         }
     }
 
@@ -118,35 +107,23 @@ fn motion(state: &Vector4<f64>, polar: Polar) -> (Vector4<f64>, Matrix4<f64>, na
 
 impl Method for Extended {
     fn step(&mut self, step: &Step) {
-        if let Some(polar) = self.polars.next(step) {
-            self.time = step.stance_end;
-            self.take(Waiting::Step(polar));
-        }
+        self.aligner.step(step).into_iter().for_each(|next| self.take(next));
     }
 
     fn observe(&mut self, observation: &Observation) {
-        if let Measured::Position { place, .. } = observation.measured {
-            self.take(Waiting::Fix(place));
-        }
+        self.aligner.observe(observation).into_iter().for_each(|next| self.take(next));
     }
 
     fn estimate(&self) -> Option<Estimate> {
-        let time = self.time;
-        match (&self.phi0, &self.state) {
-            (Ok(_), Some((state, p))) => {
-                Some(Estimate { time, place: [state.x, state.y], covariance: p.fixed_view::<2, 2>(0, 0).into_owned() })
-            }
-            (Err(beginning), _) => {
-                beginning.last().map(|place| Estimate::of_fix(time, place, self.parameters.fix_sigma_m))
-            }
-            (Ok(_), None) => None,
-        }
+        let of =
+            |(state, p): (Vector4<f64>, Matrix4<f64>)| ([state.x, state.y], p.fixed_view::<2, 2>(0, 0).into_owned());
+        self.aligner.estimate(self.state.map(of))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::polar::tests::step;
+    use super::super::polar::{Polars, tests::step};
     use super::*;
     use nalgebra::{SMatrix, SVector};
 

@@ -4,23 +4,19 @@
 //! Fix, 2.1.1 and 3.1. The prediction has no noise of its own (2.3): what a step is wrong by is in the variances of
 //! `dx` and `dy`, which each step sets anew.
 
-use super::beginning::{Beginning, Waiting};
-use super::fix::Measured;
+use super::aligner::Aligner;
+use super::beginning::Waiting;
 use super::method::{Estimate, Method, Start};
 use super::observation::Observation;
 use super::parameters::Documented;
-use super::polar::Polars;
 use nalgebra::{Matrix4, Vector4};
 use sohle_shared::step::Step;
-use sohle_shared::time::Micros;
 
 /// The filter: `(x, y, dx, dy)`.
 #[derive(Clone, Debug)]
 pub struct Kalman {
     parameters: Documented,
-    polars: Polars,
-    phi0: Result<f64, Beginning>,
-    time: Micros,
+    aligner: Aligner,
     state: Option<(Vector4<f64>, Matrix4<f64>)>,
 }
 
@@ -32,13 +28,7 @@ impl Kalman {
             let covariance = Vector4::new(sigma * sigma, sigma * sigma, variance, variance);
             (Vector4::new(x, y, 0.0, 0.0), Matrix4::from_diagonal(&covariance))
         };
-        Self {
-            parameters: *parameters,
-            polars: Polars::default(),
-            phi0: start.direction.map(|(phi0, _)| phi0).ok_or_else(|| Beginning::new(start.place.map(|(at, _)| at))),
-            time: Micros(0),
-            state: start.place.map(at),
-        }
+        Self { parameters: *parameters, aligner: Aligner::new(parameters, start), state: start.place.map(at) }
     }
 
     /// (3.1 - 3.5) with the displacement of this step.
@@ -70,19 +60,10 @@ impl Kalman {
     }
 
     fn take(&mut self, next: Waiting) {
-        match (&mut self.phi0, next) {
-            (Ok(phi0), Waiting::Step(polar)) => {
-                let along = polar.along(*phi0);
-                self.predict(along);
-            }
-            (Ok(_), Waiting::Fix(place)) => self.update(place),
-            (Err(beginning), next) => {
-                beginning.push(next);
-                let Some(phi0) = beginning.direction(self.parameters.spread_m) else { return };
-                if let Err(beginning) = std::mem::replace(&mut self.phi0, Ok(phi0)) {
-                    beginning.into_waiting().into_iter().for_each(|waiting| self.take(waiting));
-                }
-            }
+        match (next, self.aligner.phi0()) {
+            (Waiting::Step(polar), Some(phi0)) => self.predict(polar.along(phi0)),
+            (Waiting::Fix(place), _) => self.update(place),
+            (Waiting::Step(_), None) => {}
         }
     }
 }
@@ -94,33 +75,23 @@ fn transition() -> Matrix4<f64> {
 
 impl Method for Kalman {
     fn step(&mut self, step: &Step) {
-        if let Some(polar) = self.polars.next(step) {
-            self.time = step.stance_end;
-            self.take(Waiting::Step(polar));
-        }
+        self.aligner.step(step).into_iter().for_each(|next| self.take(next));
     }
 
     fn observe(&mut self, observation: &Observation) {
-        if let Measured::Position { place, .. } = observation.measured {
-            self.take(Waiting::Fix(place));
-        }
+        self.aligner.observe(observation).into_iter().for_each(|next| self.take(next));
     }
 
     fn estimate(&self) -> Option<Estimate> {
-        let (time, sigma) = (self.time, self.parameters.fix_sigma_m);
-        match (&self.phi0, &self.state) {
-            (Ok(_), Some((state, p))) => {
-                Some(Estimate { time, place: [state.x, state.y], covariance: p.fixed_view::<2, 2>(0, 0).into_owned() })
-            }
-            (Err(beginning), _) => beginning.last().map(|place| Estimate::of_fix(time, place, sigma)),
-            (Ok(_), None) => None,
-        }
+        let of =
+            |(state, p): (Vector4<f64>, Matrix4<f64>)| ([state.x, state.y], p.fixed_view::<2, 2>(0, 0).into_owned());
+        self.aligner.estimate(self.state.map(of))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::polar::tests::step;
+    use super::super::polar::{Polars, tests::step};
     use super::*;
     use nalgebra::{SMatrix, SVector};
 

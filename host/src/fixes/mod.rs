@@ -16,6 +16,7 @@
 //! Fix, chapters 2 and 3.
 
 pub mod adjustment;
+mod aligner;
 mod beginning;
 pub mod extended;
 pub mod fix;
