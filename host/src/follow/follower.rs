@@ -171,9 +171,9 @@ impl Follower {
         Said { estimate, room, mode, unusual }
     }
 
-    /// Takes in what another source says of the place; returns what is known with it. It counts where the person is now.
+    /// Takes in what another source says of the place, which counts when it was measured; returns what is known with it.
     pub fn observe(&mut self, observation: &Observation) -> &Estimate {
-        self.filter.sight(&sight(observation, &Outliers::default()))
+        self.filter.sight(&sight(observation, &Outliers::default()), observation.time)
     }
 
     /// The building.
@@ -293,16 +293,16 @@ mod tests {
         let walk = walk(&["W02", "W05", "hall", "E03"]);
         let mut follower = from("anywhere");
         // The floors are alike: without a word of the floor both stay possible.
-        let near = |truth: &Vector3<f64>, off: f64| Observation {
+        let near = |time: Micros, truth: &Vector3<f64>, off: f64| Observation {
             floor: Some(0),
-            ..Observation::position(Micros(0), [truth.x + off, truth.y], 2.0)
+            ..Observation::position(time, [truth.x + off, truth.y], 2.0)
         };
         let mut alone = from("anywhere");
         for (index, (step, truth)) in walk.steps.iter().zip(&walk.truth).enumerate() {
             follower.step(step);
             alone.step(step);
             if index % 5 == 4 {
-                follower.observe(&near(truth, if index % 20 == 19 { 15.0 } else { 0.5 }));
+                follower.observe(&near(step.stance_end, truth, if index % 20 == 19 { 15.0 } else { 0.5 }));
             }
         }
         let first = |follower: &Follower| {
@@ -311,6 +311,30 @@ mod tests {
         assert!(first(&follower) < first(&alone), "{} {}", first(&follower), first(&alone));
         let off = (follower.estimate().place().unwrap().position - walk.truth.last().unwrap()).xy().norm();
         assert!(off < 1.5, "{off}");
+    }
+
+    #[test]
+    fn a_position_that_comes_late_counts_where_it_was_measured() {
+        let walk = walk(&["W02", "W05", "hall", "E03"]);
+        let errors = |as_if_new: bool| -> f64 {
+            let mut follower = from("anywhere");
+            let mut squares = Vec::new();
+            for (index, step) in walk.steps.iter().enumerate() {
+                follower.step(step);
+                // Exact, and three strides late.
+                if let (0, Some(late)) = (index % 4, index.checked_sub(3)) {
+                    let (truth, measured) = (walk.truth[late], walk.steps[late].stance_end);
+                    let time = if as_if_new { step.stance_end } else { measured };
+                    follower.observe(&Observation::position(time, [truth.x, truth.y], 0.3));
+                }
+                if let Some(place) = follower.estimate().place().filter(|_| index > 20) {
+                    squares.push((place.position - walk.truth[index]).xy().norm_squared());
+                }
+            }
+            (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        };
+        let (late, new) = (errors(false), errors(true));
+        assert!(late < 0.4 && late < 0.5 * new, "{late} {new}");
     }
 
     #[test]

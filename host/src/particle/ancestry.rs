@@ -39,6 +39,15 @@ pub struct PastPlace {
     pub floor: usize,
 }
 
+/// Where a particle was between two steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Spot {
+    /// **Units:** m; **Frame:** building.
+    pub place: [f32; 2],
+    /// Indices of the floors at both steps.
+    pub floors: [u16; 2],
+}
+
 /// The tree of forebears.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ancestry {
@@ -112,6 +121,22 @@ impl Ancestry {
             self.free.push(index);
             index = node.parent;
         }
+    }
+
+    /// Where each particle was between two steps in a row, so much of the way from the first to the second; nothing where that is
+    /// not remembered of all.
+    pub fn between(&self, from: u32, to: u32, part: f32) -> Option<Vec<Spot>> {
+        let spot = |&leaf: &u32| {
+            let mut node = self.nodes.get(leaf as usize)?;
+            while node.step > to {
+                node = self.nodes.get(node.parent as usize)?;
+            }
+            let before =
+                self.nodes.get(node.parent as usize).filter(|before| before.step == from && node.step == to)?;
+            let place = [0, 1].map(|axis| before.place[axis] + part * (node.place[axis] - before.place[axis]));
+            Some(Spot { place, floors: [before.floor, node.floor] })
+        };
+        self.leaves.iter().map(spot).collect()
     }
 
     /// The past of the particles for which `belongs` holds, from the oldest step.
@@ -197,6 +222,22 @@ mod tests {
         assert_eq!(past.iter().map(|past| past.position[0]).collect::<Vec<_>>(), [5.0, 7.0]);
         ancestry.redraw(&[9]);
         assert!(ancestry.past(&copies, |_| true).is_empty());
+    }
+
+    #[test]
+    fn where_each_was_between_two_steps_is_told_as_far_as_it_is_remembered() {
+        let at = |x: f32, floor: u16| Particle { x, floor, weight: 1.0, ..Particle::default() };
+        let mut ancestry = Ancestry::default();
+        ancestry.grow(&[at(1.0, 0), at(5.0, 0)], None, 1);
+        ancestry.grow(&[at(2.0, 0), at(7.0, 1)], None, 2);
+        ancestry.grow(&[at(3.0, 0), at(8.0, 1), at(9.0, 1)], Some(&[0, 1, 1]), 3);
+        let places = |from, to, part| -> Option<Vec<f32>> {
+            Some(ancestry.between(from, to, part)?.iter().map(|spot| spot.place[0]).collect())
+        };
+        assert_eq!(places(1, 2, 0.25), Some(vec![1.25, 5.5, 5.5]));
+        assert_eq!(places(2, 3, 1.0), Some(vec![3.0, 8.0, 9.0]));
+        assert_eq!(ancestry.between(1, 2, 0.5).unwrap()[2].floors, [0, 1]);
+        assert_eq!((places(0, 1, 0.5), places(1, 3, 0.5)), (None, None));
     }
     use proptest::prelude::*;
 

@@ -1,5 +1,7 @@
 //! The particle filter: from steps to a place in the building.
 
+mod sights;
+
 use super::Error;
 use super::ancestry::{Ancestry, PastPlace};
 use super::cloud::Particle;
@@ -66,6 +68,10 @@ pub struct ParticleFilter {
     /// Counts the steps of this filter.
     number: u64,
     previous: Option<(u32, Micros)>,
+    /// Index and end of the last steps that the particles have gone, oldest first.
+    times: VecDeque<(u32, Micros)>,
+    /// What was said of the place since the last step.
+    waiting: Vec<(Micros, Sight)>,
     spread: Spread,
     /// Logarithm of the odds against the cloud, never below 0.
     against: f64,
@@ -123,6 +129,8 @@ impl ParticleFilter {
             map,
             number: 0,
             previous: None,
+            times: VecDeque::new(),
+            waiting: Vec::new(),
             spread: Spread::of(&seeded),
             particles: seeded.particles,
             against: 0.0,
@@ -158,27 +166,9 @@ impl ParticleFilter {
         } else {
             self.draw(&moved)
         };
-        self.remember(parents.as_deref(), step.index);
-        let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
-        self.tell(Some(step.stance_end), step.index, total, moved.effective(), likelihood);
-        &self.estimate
-    }
-
-    /// Takes in what another source says of the place now; returns what is known with it. A floor that is not in the
-    /// building is not heard.
-    pub fn sight(&mut self, sight: &Sight) -> &Estimate {
-        let floor = sight.floor.and_then(|number| self.map.floor(number));
-        self.number += 1;
-        let moved = sight.weigh(&mut self.particles, floor);
-        let parents = match self.parameters.method {
-            Method::Documented => self.draw_documented(&moved),
-            Method::Covariance => self.draw(&moved),
-        };
-        if let Some(parents) = parents {
-            self.ancestry.redraw(&parents);
-        }
-        let total = self.particles.iter().map(|particle| f64::from(particle.weight)).sum();
-        self.tell(self.estimate.time, self.estimate.step, total, moved.effective(), moved.likelihood());
+        self.remember(parents.as_deref(), step);
+        let moved = self.weigh_waiting().unwrap_or(moved);
+        self.tell(Some(step.stance_end), step.index, self.total(), moved.effective(), likelihood);
         &self.estimate
     }
 
@@ -266,6 +256,7 @@ impl ParticleFilter {
         // Who was sown has no forebears: what is known of the past will not become better.
         self.settled = self.past();
         self.ancestry.clear();
+        self.times.clear();
         self.particles = everywhere.particles;
         if !around.is_empty() {
             weigh(&mut self.particles, 1.0 - AROUND_PART);
@@ -293,12 +284,16 @@ impl ParticleFilter {
     }
 
     /// Keeps the past, as soon as the cloud is small enough for it.
-    fn remember(&mut self, parents: Option<&[usize]>, step: u32) {
+    fn remember(&mut self, parents: Option<&[usize]>, step: &Step) {
+        if self.times.len() == sights::REMEMBERED {
+            self.times.pop_front();
+        }
+        self.times.push_back((step.index, step.stance_end));
         if self.particles.len() > MOST_REMEMBERED {
             self.settled = self.past();
             self.ancestry.clear();
         } else {
-            self.ancestry.grow(&self.particles, parents, step);
+            self.ancestry.grow(&self.particles, parents, step.index);
         }
     }
 

@@ -174,13 +174,11 @@ impl<'a> Comparison<'a> {
         let mut filter = ParticleFilter::new(self.walk.map.clone(), p, &start, seed)?;
         let mut path = Path::default();
         let mut waiting = said.iter().peekable();
-        for (index, step) in self.steps.iter().enumerate() {
-            filter.step(step);
-            // Between two steps a position belongs to the nearer.
-            let until = self.steps.get(index + 1).map_or(i64::MAX, |next| (step.stance_end.0 + next.stance_end.0) / 2);
-            while let Some(observation) = waiting.next_if(|observation| observation.time.0 < until) {
-                filter.sight(&sight(observation, &Outliers::default()));
+        for step in &self.steps {
+            while let Some(observation) = waiting.next_if(|observation| observation.time < step.stance_end) {
+                filter.sight(&sight(observation, &Outliers::default()), observation.time);
             }
+            filter.step(step);
             if let Some(place) = filter.estimate().place() {
                 path.note(step.stance_end, [place.position.x, place.position.y]);
             }
