@@ -29,6 +29,17 @@ pub struct Held {
     pub weight: f64,
 }
 
+/// How far off something is from what is known without it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Innovation {
+    /// **Units:** m.
+    pub off_m: f64,
+    /// In squared standard deviations over the degrees of freedom.
+    pub normalised: f64,
+    /// The probability that it is no outlier, as far as can be told from what is known without it.
+    pub right: f64,
+}
+
 /// How the weight follows from how far something is off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Belief {
@@ -137,22 +148,24 @@ impl Held {
         }
     }
 
-    /// How far off it is (m), and in squared standard deviations over its degrees of freedom, when the place has this
-    /// covariance without it.
-    pub fn innovation(&self, states: &[Column], place: &Matrix2<f64>) -> (f64, f64) {
+    /// How far off it is when the place has this covariance without it.
+    pub fn innovation(&self, states: &[Column], place: &Matrix2<f64>, p: &Parameters) -> Innovation {
         let seen = self.seen(self.at(states));
-        match self.measured {
+        let (off_m, squared, freedom, odds) = match self.measured {
             Measured::Position { covariance, .. } => {
                 let spread = covariance + place + Matrix2::identity() * self.beyond;
                 let inverse = spread.try_inverse().unwrap_or_else(Matrix2::zeros);
-                (seen.off.norm(), seen.off.dot(&(inverse * seen.off)) / 2.0)
+                let squared = seen.off.dot(&(inverse * seen.off));
+                (seen.off.norm(), squared, 2.0, p.outliers.odds_of_place(spread.determinant()))
             }
             Measured::Range { sigma_m, .. } => {
                 let row = seen.rows.row(0);
                 let variance = sigma_m * sigma_m + self.beyond + (row * place * row.transpose())[(0, 0)];
-                (seen.off.x.abs(), seen.off.x * seen.off.x / variance)
+                (seen.off.x.abs(), seen.off.x * seen.off.x / variance, 1.0, p.outliers.odds_of_range(variance))
             }
-        }
+        };
+        let right = 1.0 / (1.0 + odds * (0.5 * squared).min(500.0).exp());
+        Innovation { off_m, normalised: squared / freedom, right }
     }
 }
 
@@ -172,7 +185,7 @@ mod tests {
     #[test]
     fn gradients_are_those_of_the_cost_of_what_is_believed() {
         // Without outliers the cost is a half of the squares.
-        let outliers = Outliers { share: 0.0, ..Outliers::default() };
+        let outliers = Outliers { share: 0.0, range_share: 0.0, ..Outliers::default() };
         let p = Parameters { outliers, ..Parameters::default() };
         for measured in [
             Measured::Position { place: [0.5, 2.5], covariance: Matrix2::new(1.0, 0.3, 0.3, 0.5) },

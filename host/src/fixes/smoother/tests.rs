@@ -200,6 +200,52 @@ fn ranges_to_three_anchors_are_a_place() {
     assert!((place[0] - last[0]).hypot(place[1] - last[1]) < 0.5, "{place:?} {last:?}");
 }
 
+#[test]
+fn ranges_alone_find_the_place() {
+    let (steps, truth) = walk(150);
+    let anchors = [[0.0, 0.0], [30.0, -20.0], [10.0, 20.0], [-10.0, -15.0]];
+    let mut smoother = new();
+    for (index, (step, truth)) in steps.iter().zip(&truth).enumerate() {
+        smoother.step(step);
+        let anchor = anchors[index % 4];
+        let metres = (truth[0] - anchor[0]).hypot(truth[1] - anchor[1]) + 0.1 * some(index, 12.9898);
+        let measured = Measured::Range { anchor, above_m: 0.0, metres, sigma_m: 0.2 };
+        smoother.observe(&Observation { measured, ..Observation::position(step.stance_end, [0.0; 2], 1.0) });
+    }
+    let (place, last) = (smoother.estimate().unwrap().place, truth[149]);
+    assert!((place[0] - last[0]).hypot(place[1] - last[1]) < 0.5, "{place:?} {last:?}");
+}
+
+#[test]
+fn an_exact_position_after_a_long_way_without_any_is_believed() {
+    let (steps, truth) = walk(300);
+    let mut smoother = new();
+    follow(&mut smoother, (&steps[..150], &truth[..150]), &said(&steps[..150], &truth[..150], 3.0, false), 0);
+    steps[150..].iter().for_each(|step| smoother.step(step));
+    // By their own covariance steps may have lost the place by metres; a code on a door is known to ten centimetres.
+    let sigma_m = smoother.estimate().unwrap().sigma_m();
+    assert!((2.0..20.0).contains(&sigma_m), "{sigma_m}");
+    let door = [truth[299][0] + 0.6 * sigma_m, truth[299][1] - 0.3 * sigma_m];
+    let verdict = smoother.hear(&Observation::position(steps[299].stance_end, door, 0.1));
+    assert_eq!(verdict.outcome, Outcome::Taken, "{verdict}");
+    let place = smoother.estimate().unwrap().place;
+    assert!((place[0] - door[0]).hypot(place[1] - door[1]) < 0.2, "{place:?} {door:?}");
+}
+
+#[test]
+fn positions_heard_before_the_steps_that_were_made_by_then_count_where_they_were_measured() {
+    let (steps, truth) = walk(60);
+    let said = said(&steps, &truth, 1.0, false);
+    let (mut before, mut after) = (new(), new());
+    before.observe(said.last().unwrap());
+    steps.iter().for_each(|step| before.step(step));
+    said.iter().for_each(|observation| before.observe(observation));
+    steps.iter().for_each(|step| after.step(step));
+    said.iter().chain(said.last()).for_each(|observation| after.observe(observation));
+    let [one, other] = [before, after].map(|smoother| smoother.estimate().unwrap().place);
+    assert!((one[0] - other[0]).hypot(one[1] - other[1]) < 0.05, "{one:?} {other:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     /// Law: whatever comes, in whatever order, there is an answer of numbers.

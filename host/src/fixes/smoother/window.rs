@@ -4,7 +4,7 @@ mod search;
 
 use super::Parameters;
 use super::chain::{Chain, Eliminated};
-use super::held::{Belief, Held, Spot};
+use super::held::{Belief, Held, Innovation, Spot};
 use super::link::Link;
 use super::state::{Column, DRIFT, HEADING, Prior, SCALE, place};
 use super::verdict::{Outcome, Verdict};
@@ -17,6 +17,8 @@ use sohle_shared::time::Micros;
 
 /// Nothing is known of a place (standard deviation). **Units:** m.
 const ANYWHERE_M: f64 = 1e3;
+/// A place that is known better than this is one, whatever told of it (root of the sum of the variances). **Units:** m.
+const KNOWN_M: f64 = 5.0;
 /// Nothing is known of a direction (standard deviation). **Units:** rad.
 const ANY_DIRECTION: f64 = 3.0;
 /// A direction known better than this can be linearised (standard deviation). **Units:** rad.
@@ -159,11 +161,13 @@ impl Smoother {
         };
         self.attach(&mut held);
         self.place_first(&held);
-        let (off_m, normalised) = self.innovation(&held);
+        let Innovation { off_m, normalised, right } = self.innovation(&held);
         let off = held.off(&self.states);
-        held.weigh(&self.states, Belief::Settled, &self.parameters);
+        // By its own standard deviation alone, what is exact would never be believed where little is known.
+        held.weight = right;
         self.held.push(held);
         self.settle();
+        self.placed |= self.sigma_m().is_some_and(|sigma| sigma < KNOWN_M);
         let weight = self.held.last().map_or(0.0, |held| held.weight);
         self.doubts.push(weight < 0.5);
         if self.doubts.len() > LOOKED_AT {
@@ -271,22 +275,24 @@ impl Smoother {
     }
 
     /// How far off something is from what is known without it.
-    fn innovation(&self, held: &Held) -> (f64, f64) {
+    fn innovation(&self, held: &Held) -> Innovation {
         let Spot { index, part } = held.spot;
         let covariances = self.known.covariances(index);
         let corner = |block: &super::state::Block| block.fixed_view::<2, 2>(0, 0).into_owned();
-        let Some((own, cross)) = covariances.last() else { return (0.0, 0.0) };
+        let Some((own, cross)) = covariances.last() else { return Innovation::default() };
         let mut covariance = corner(own) * (1.0 - part) * (1.0 - part);
         if let Some((next, _)) = covariances.len().checked_sub(2).and_then(|at| covariances.get(at)) {
             let both = corner(cross);
             covariance += corner(next) * (part * part) + (both + both.transpose()) * (part * (1.0 - part));
         }
-        held.innovation(&self.states, &covariance)
+        held.innovation(&self.states, &covariance, &self.parameters)
     }
 
     /// Finds the states that fit best.
     fn settle(&mut self) {
         if self.directed {
+            // The first with what the last is worth by all that was known before it.
+            self.newton();
             self.rounds(Belief::Settled, ROUNDS);
         } else {
             self.find_direction();
@@ -299,23 +305,28 @@ impl Smoother {
             for held in &mut self.held {
                 held.weigh(&self.states, belief, &self.parameters);
             }
-            if !self.eliminate() {
-                return;
-            }
-            let mut moved = std::mem::take(&mut self.moved);
-            self.known.solve(&mut moved);
-            let turn = moved.iter().map(|moved| moved[HEADING].abs()).fold(0.0, f64::max);
-            let part = if turn > LARGEST_TURN { LARGEST_TURN / turn } else { 1.0 };
-            let mut largest = 0.0_f64;
-            for (state, moved) in self.states.iter_mut().zip(&moved) {
-                *state += moved * part;
-                largest = largest.max(moved.amax());
-            }
-            self.moved = moved;
-            if largest < SAME {
+            if self.newton().is_none_or(|largest| largest < SAME) {
                 break;
             }
         }
+    }
+
+    /// One step of Gauss-Newton; the largest change, unless the states are not determined.
+    fn newton(&mut self) -> Option<f64> {
+        if !self.eliminate() {
+            return None;
+        }
+        let mut moved = std::mem::take(&mut self.moved);
+        self.known.solve(&mut moved);
+        let turn = moved.iter().map(|moved| moved[HEADING].abs()).fold(0.0, f64::max);
+        let part = if turn > LARGEST_TURN { LARGEST_TURN / turn } else { 1.0 };
+        let mut largest = 0.0_f64;
+        for (state, moved) in self.states.iter_mut().zip(&moved) {
+            *state += moved * part;
+            largest = largest.max(moved.amax());
+        }
+        self.moved = moved;
+        Some(largest)
     }
 
     /// Builds and eliminates the normal equations; whether they are determined.
@@ -415,6 +426,11 @@ impl Smoother {
         Some((self.states[last], covariance))
     }
 
+    /// How well the last place is known (root of the sum of the variances).
+    fn sigma_m(&self) -> Option<f64> {
+        self.state_of_last().map(|(_, covariance)| (covariance[(0, 0)] + covariance[(1, 1)]).max(0.0).sqrt())
+    }
+
     /// What was found out about the steps.
     pub fn calibration(&self) -> Option<Calibration> {
         let (state, covariance) = self.state_of_last()?;
@@ -455,6 +471,12 @@ impl Method for Smoother {
         // The first state is where the first step begins.
         self.open(Micros(step.stance_start.0 - 1));
         self.take_back(step.stance_end);
+        if let ([first], true) = (&mut self.moments[..], self.last_index.is_none())
+            && first.time >= step.stance_end
+        {
+            // A position was heard before the steps that had been made by then.
+            first.time = Micros(step.stance_start.0 - 1);
+        }
         let missing = self.last_index.map(|last| step.index.wrapping_sub(last).wrapping_sub(1));
         self.last_index = Some(step.index);
         let Some(last) = self.moments.last().map(|last| last.time) else { return };
