@@ -12,7 +12,7 @@ use sohle_shared::wire::message::FromShoe;
 use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::packed::PackedStep;
 use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
@@ -152,6 +152,127 @@ fn a_live_walk_arrives_whole_is_recorded_and_leads_to_the_same_bits() {
     let steps: Vec<usize> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
     assert!(steps[0] == steps[1] && steps[0] >= 5 && steps[2] == steps[3] && steps[2] > 50, "{line}");
     drop(shoe);
+}
+
+/// Where steps that were told as JSON lead when the first begins at (30, 10) m to the north: the end of each stance, and the
+/// place.
+fn way(events: &[serde_json::Value]) -> Vec<(i64, [f64; 2])> {
+    let (mut place, mut heading) = ([30.0, 10.0], std::f64::consts::FRAC_PI_2);
+    let steps = events.iter().filter(|event| event["event"] == "step");
+    steps
+        .map(|step| {
+            let [x, y] = [0, 1].map(|axis| step["displacement_m"][axis].as_f64().unwrap());
+            let (sin, cos) = f64::sin_cos(heading);
+            place = [place[0] + cos * x - sin * y, place[1] + sin * x + cos * y];
+            heading += step["turn_rad"].as_f64().unwrap();
+            (step["stance_end_us"].as_i64().unwrap(), place)
+        })
+        .collect()
+}
+
+/// A position at the end of each step, as a line.
+fn positions(way: &[(i64, [f64; 2])]) -> Vec<String> {
+    let line = |(time, [x, y]): &(i64, [f64; 2])| {
+        format!("{{\"time_us\":{time},\"source\":\"uwb\",\"position\":[{x},{y}],\"sigma_m\":0.3}}")
+    };
+    way.iter().map(line).collect()
+}
+
+/// Runs `sohle live` at a shoe that has walked and stands since; all it says.
+fn heard(more: &[&str]) -> Vec<serde_json::Value> {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp:127.0.0.1:{}", listener.local_addr().unwrap().port());
+    std::thread::spawn(move || stand_later(&listener));
+    let live = sohle(&[&["live", &address, "--format", "json"], more].concat());
+    let (out, err) = (String::from_utf8_lossy(&live.stdout), String::from_utf8_lossy(&live.stderr));
+    assert!(live.status.success(), "{out}{err}");
+    out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[test]
+fn positions_of_datagrams_are_put_together_with_the_steps_of_a_shoe_late_and_in_any_order() {
+    let steps = STRIDES.to_string();
+    let way = way(&heard(&["--no-record", "--steps", &steps, "--for", "20"]));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("live.mcap");
+    // A free port, which nobody takes in the next moment.
+    let place = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let mut lines = positions(&way);
+    // The last come first, and all come a minute late; one says nothing of its time, which is now; one is no fix at all.
+    lines.reverse();
+    let [x, y] = way[way.len() - 1].1;
+    lines.push(format!("{{\"source\":\"code\",\"position\":[{x},{y}],\"sigma_m\":0.1}}"));
+    lines.push("nonsense".into());
+    let sender = std::thread::spawn(move || {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.connect(place).unwrap();
+        let until = Instant::now() + Duration::from_secs(15);
+        // An empty line is none; it is refused as long as nobody listens.
+        while Instant::now() < until {
+            let told = socket.send(b"\n").is_ok();
+            std::thread::sleep(Duration::from_millis(20));
+            if told && socket.send(b"\n").is_ok() {
+                break;
+            }
+        }
+        for line in lines {
+            socket.send(line.as_bytes()).unwrap();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    });
+    let udp = format!("udp:{place}");
+    let events = heard(&["--fixes", &udp, "--out", path.to_str().unwrap(), "--for", "6"]);
+    sender.join().unwrap();
+    let summary = &events.last().unwrap()["positions"];
+    let all = STRIDES as u64;
+    assert_eq!((&summary["no_fixes"], &summary["sources"]["uwb"]["taken"]), (&1.into(), &all.into()), "{summary}");
+    assert_eq!(summary["sources"]["code"]["taken"], 1, "{summary}");
+    let off = |place: &serde_json::Value| {
+        let [px, py] = [0, 1].map(|axis| place["position_m"][axis].as_f64().unwrap());
+        (px - x).hypot(py - y)
+    };
+    assert!(off(&summary["at_end"]) < 0.3, "{summary}");
+
+    // The recording has them, and a replay finds the same.
+    let recording = sohle::recording::open(&path, None).unwrap();
+    assert_eq!(recording.fixes.len(), STRIDES + 1);
+    let late = |fix: &sohle::fixes::Fix| fix.arrived - fix.time > 30_000_000;
+    assert_eq!(recording.fixes.iter().filter(|fix| late(fix)).count(), STRIDES);
+    let again = folder.path().join("again");
+    let replay = sohle(&["replay", path.to_str().unwrap(), "--out", again.to_str().unwrap()]);
+    let told = String::from_utf8_lossy(&replay.stdout);
+    assert!(replay.status.success() && told.contains("positions of"), "{told}");
+}
+
+#[test]
+fn a_shoe_is_followed_in_a_building_with_the_positions_of_a_file() {
+    let steps = STRIDES.to_string();
+    let way = way(&heard(&["--no-record", "--steps", &steps, "--for", "20"]));
+    let folder = tempfile::tempdir().unwrap();
+    let fixes = folder.path().join("fixes.jsonl");
+    std::fs::write(&fixes, positions(&way).join("\n")).unwrap();
+    let twin = twin();
+    let fixes = ["--fixes", fixes.to_str().unwrap(), "--steps", &steps, "--for", "20", "--no-record"];
+    let alone = heard(&fixes);
+    let told: Vec<_> = alone.iter().filter(|event| event["event"] == "position").collect();
+    assert!(told.len() > STRIDES / 2, "{}", told.len());
+    let inside = heard(&[&fixes[..], &["--building", &twin]].concat());
+    let places: Vec<_> = inside.iter().filter(|event| event["event"] == "place").collect();
+    assert_eq!(places.len(), STRIDES);
+    let (_, [x, y]) = way[way.len() - 1];
+    for positions in [&told[told.len() - 1]["positions"], &places[STRIDES - 1]["positions"]] {
+        let [px, py] = [0, 1].map(|axis| positions["position_m"][axis].as_f64().unwrap());
+        assert!((px - x).hypot(py - y) < 1.0, "{positions}");
+    }
+    let summary = &inside.last().unwrap()["places"]["positions"]["sources"]["uwb"];
+    assert!(summary["taken"].as_u64().unwrap() > STRIDES as u64 / 2, "{summary}");
+}
+
+#[test]
+fn a_source_that_cannot_be_had_is_told_before_a_shoe_is_looked_for() {
+    let live = sohle(&["live", "tcp:127.0.0.1:1", "--no-record", "--for", "0.1", "--fixes", "udp:nowhere"]);
+    let err = String::from_utf8_lossy(&live.stderr);
+    assert!(!live.status.success() && err.starts_with("error: fixes udp:nowhere: "), "{err}");
 }
 
 #[test]

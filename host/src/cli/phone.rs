@@ -1,10 +1,12 @@
 //! What `replay` does with a recording of a phone: its steps go the same way as those of a shoe.
 
+use super::fixes::Source;
 use super::located::{Following, finish_and_tell};
 use super::table::Table;
 use super::{Error, Output, fixes, print};
 use crate::export::picture::{Line, Picture, Placement, Role};
 use crate::export::{self, Named};
+use crate::fixes::line::Clock;
 use crate::fixes::smoother;
 use crate::phone::{self, Parameters};
 use crate::track::Track;
@@ -21,7 +23,7 @@ pub struct Replay<'a> {
     /// Who is followed, if there is a building.
     pub following: Option<Following>,
     /// Positions of other sources.
-    pub fixes: Option<&'a Path>,
+    pub fixes: Option<&'a Source>,
     /// Where the results go.
     pub output: &'a Output,
     /// Tells nothing.
@@ -67,8 +69,9 @@ impl Replay<'_> {
             print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;
         }
         let Some(track) = tracks.first() else { return Ok(()) };
-        let incoming =
-            fixes::incoming(self.fixes, self.following.as_ref(), Some(0), &smoother::Parameters::phone(), self.quiet)?;
+        // The clock of a phone counts from 1970.
+        let (clock, settings) = (Clock::of_past(Some(0)), smoother::Parameters::phone());
+        let incoming = fixes::incoming((self.fixes, &[]), self.following.as_ref(), clock, &settings, self.quiet)?;
         let Some(mut following) = self.following else {
             return fixes::alone(incoming, &track.steps, &folder, self.quiet);
         };

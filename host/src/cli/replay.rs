@@ -1,11 +1,12 @@
 //! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
 
-use super::fixes::{alone, incoming};
+use super::fixes::{Source, alone, incoming};
 use super::located::{Following, InBuilding, finish_and_tell};
 use super::phone::Replay;
 use super::report::{Report, Settings};
 use super::{Error, Output, convert, parameters, print, shown, window};
 use crate::calibration;
+use crate::fixes::line::Clock;
 use crate::fixes::smoother;
 use crate::recording::live::BEGAN;
 use crate::recording::{self, Profile};
@@ -37,9 +38,10 @@ pub struct Args {
     /// Tracks with the settings of the source document too, side by side
     #[arg(long)]
     compare: bool,
-    /// Positions and ranges of other sources, a JSON object to a line (docs/fixes.md); '-' is the standard input
+    /// Positions and ranges of other sources, a JSON object to a line (docs/fixes.md); '-' is the standard input. They are
+    /// written into the recording, and come in place of those that it brings along
     #[arg(long, value_name = "FILE|-")]
-    fixes: Option<PathBuf>,
+    fixes: Option<Source>,
     /// Opens no window at the end; without a display there is none anyway
     #[arg(long)]
     headless: bool,
@@ -67,7 +69,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             None => phone::Parameters::default(),
         };
         let walk = shown::Walk { phone: chosen.clone(), ..shown::Walk::of(file.clone(), following.as_ref()) };
-        let fixes = fixes.as_deref();
+        let fixes = fixes.as_ref();
         Replay { file: &file, parameters: chosen, compare, following, fixes, output: &output, quiet }.run()?;
         if window::is_wanted(headless, quiet) {
             window::show(walk);
@@ -85,7 +87,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     }
     let calibration = calibration.as_deref().map(calibration::read).transpose()?;
     let profile = profile.map(|text| Profile::parse(&text)).transpose()?;
-    let recording = recording::open(&file, profile.as_ref())?;
+    let mut recording = recording::open(&file, profile.as_ref())?;
     let again = recording.again;
     if let Some(again) = &again
         && !quiet
@@ -93,8 +95,12 @@ pub fn run(args: Args) -> Result<(), Error> {
         print(&format!("{again}\n"))?;
     }
     let folder = output.folder(&stem(&file));
-    let epoch = recording.metadata.get(BEGAN).and_then(|began| began.parse().ok());
-    let mut incoming = incoming(fixes.as_deref(), following.as_ref(), epoch, &smoother::Parameters::default(), quiet)?;
+    let clock = Clock::of_past(recording.metadata.get(BEGAN).and_then(|began| began.parse().ok()));
+    let said = (fixes.as_ref(), &recording.fixes[..]);
+    let mut incoming = incoming(said, following.as_ref(), clock, &smoother::Parameters::default(), quiet)?;
+    if let Some(incoming) = incoming.as_ref().filter(|_| fixes.is_some()) {
+        recording.fixes = incoming.fixes().to_vec();
+    }
     if let Some(following) = &mut following {
         following.hearing(incoming.take());
     }

@@ -38,6 +38,21 @@ pub enum Measured {
     },
 }
 
+/// How much too long a range of UWB is, and how far it is off beyond that (standard deviation): median and median deviation of
+/// those that `sohle evaluate --suite fixes` looks at. **Units:** m.
+pub const RANGE_OFFSET_M: f64 = 0.07;
+/// See [`RANGE_OFFSET_M`]. **Units:** m.
+pub const RANGE_SIGMA_M: f64 = 0.42;
+
+impl Measured {
+    /// A range of UWB of whose errors nobody says anything: they are what is usual. **Units:** m.
+    pub fn usual_range(anchor: [f64; 2], above_m: f64, metres: f64) -> Self {
+        // What is shorter than the offset is a range all the same.
+        let metres = metres - RANGE_OFFSET_M.min(0.5 * metres);
+        Self::Range { anchor, above_m, metres, sigma_m: RANGE_SIGMA_M }
+    }
+}
+
 /// A position, or a distance, as its source says it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fix {

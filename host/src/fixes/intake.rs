@@ -1,9 +1,10 @@
 //! Where fixes come in: lines are read and checked, what becomes of them is counted, and sources that contradict each other
 //! are told of.
 
-use super::fix::Frame;
-use super::line::{self, Epoch};
-use super::observation::{Frames, Observation};
+use super::fix::{Fix, Frame};
+use super::line::LineError;
+use super::line::{self, Clock};
+use super::observation::{Frames, Observation, Refused};
 use super::smoother::{Outcome, Verdict};
 use crate::building::{Building, Error, Georeference};
 use nalgebra::Vector2;
@@ -61,7 +62,6 @@ pub struct Arrived {
 #[derive(Debug, Default)]
 pub struct Intake {
     frames: Option<Frames>,
-    epoch: Epoch,
     tallies: BTreeMap<Arc<str>, Tally>,
     /// Lines that are no fixes.
     spoilt: usize,
@@ -70,23 +70,27 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// For a building, or for wherever the first fix is. `epoch` as for [`line::parse`].
+    /// For a building, or for wherever the first fix is.
     ///
     /// # Errors
     /// As [`Georeference::projection`].
-    pub fn new(building: Option<&Building>, epoch: Epoch) -> Result<Self, Error> {
-        Ok(Self { frames: building.map(Frames::of).transpose()?, epoch, ..Self::default() })
+    pub fn new(building: Option<&Building>) -> Result<Self, Error> {
+        Ok(Self { frames: building.map(Frames::of).transpose()?, ..Self::default() })
     }
 
     /// Reads a line.
     ///
     /// # Errors
-    /// Why it is of no use, in words; it is counted.
-    pub fn line(&mut self, text: &str) -> Result<Arrived, String> {
-        let fix = line::parse(text, self.epoch).map_err(|error| {
-            self.spoilt += 1;
-            error.to_string()
-        })?;
+    /// As [`line::parse`]; it is counted.
+    pub fn line(&mut self, text: &str, clock: Clock) -> Result<Fix, LineError> {
+        line::parse(text, clock).inspect_err(|_| self.spoilt += 1)
+    }
+
+    /// Puts a fix into the frame of the building.
+    ///
+    /// # Errors
+    /// Why it is of no use; it is counted.
+    pub fn admit(&mut self, fix: &Fix) -> Result<Arrived, Refused> {
         if self.frames.is_none() {
             let place = match fix.measured {
                 super::Measured::Position { place, .. } => place,
@@ -101,17 +105,14 @@ impl Intake {
             self.frames = around.and_then(Frames::at).ok();
         }
         let observed = match &self.frames {
-            Some(frames) => frames.observe(&fix),
-            None => Frames::default().observe(&fix),
+            Some(frames) => frames.observe(fix),
+            None => Frames::default().observe(fix),
         };
-        match observed {
-            Ok(observation) => Ok(Arrived { time: fix.arrived.max(fix.time), observation }),
-            Err(refused) => {
-                let tally = self.tallies.entry(fix.source.clone()).or_default();
-                *tally.refused.entry(refused.word()).or_default() += 1;
-                Err(format!("{}: {refused}", fix.source))
-            }
-        }
+        let arrived = |observation| Arrived { time: fix.arrived.max(fix.time), observation };
+        observed.map(arrived).inspect_err(|refused| {
+            let tally = self.tallies.entry(fix.source.clone()).or_default();
+            *tally.refused.entry(refused.word()).or_default() += 1;
+        })
     }
 
     /// Counts what became of one; tells of a contradiction that comes to light.
@@ -187,18 +188,21 @@ mod tests {
     #[test]
     fn lines_are_counted_by_what_is_wrong_with_them() {
         let building = crate::building::generate::twin(2);
-        let mut intake = Intake::new(Some(&building), None).unwrap();
+        let mut intake = Intake::new(Some(&building)).unwrap();
+        let clock = Clock::default();
         let good = r#"{"time_us":1,"arrived_us":3,"source":"uwb","position":[1,2],"sigma_m":1}"#;
-        assert_eq!(intake.line(good).unwrap().time, Micros(3));
-        assert!(intake.line("no JSON").is_err());
+        let fix = intake.line(good, clock).unwrap();
+        assert_eq!(intake.admit(&fix).unwrap().time, Micros(3));
+        assert!(intake.line("no JSON", clock).is_err());
         for (line, word) in [
             (good.replace("}", r#","floor":7}"#), "floor 7 is not in the building"),
             (good.replace("}", r#","frame":"EPSG:4326"}"#), "has no georeference"),
             (good.replace(r#""time_us":1"#, r#""time_us":9000000"#), "after it arrived"),
             (good.replace(r#""sigma_m":1"#, r#""sigma_m":-1"#), "covariance"),
         ] {
-            let told = intake.line(&line).unwrap_err();
-            assert!(told.starts_with("uwb: ") && told.contains(word), "{told}");
+            let fix = intake.line(&line, clock).unwrap();
+            let told = intake.admit(&fix).unwrap_err().to_string();
+            assert!(told.contains(word), "{told}");
         }
         let tally = &intake.tallies()["uwb"];
         assert_eq!((tally.count(), tally.refused.len(), intake.spoilt()), (4, 4, 1));
@@ -222,13 +226,16 @@ mod tests {
 
     #[test]
     fn without_a_building_the_first_fix_tells_where_it_is() {
-        let mut intake = Intake::new(None, None).unwrap();
-        let earth = r#"{"time_us":1,"frame":"EPSG:4326","position":[10.0,53.5],"sigma_m":5}"#;
-        let first = intake.line(earth).unwrap().observation;
+        let mut intake = Intake::new(None).unwrap();
+        let mut observed = |line: &str| {
+            let fix = intake.line(line, Clock::default()).unwrap();
+            intake.admit(&fix)
+        };
+        let first = observed(r#"{"time_us":1,"frame":"EPSG:4326","position":[10.0,53.5],"sigma_m":5}"#);
+        let first = first.unwrap().observation;
         let super::super::Measured::Position { place, .. } = first.measured else { panic!("{first:?}") };
         // The origin is rounded to metres.
         assert!(place[0].abs() < 1.0 && place[1].abs() < 1.0, "{place:?}");
-        let local = intake.line(r#"{"time_us":2,"position":[3,4],"sigma_m":5}"#);
-        assert!(local.is_ok());
+        assert!(observed(r#"{"time_us":2,"position":[3,4],"sigma_m":5}"#).is_ok());
     }
 }

@@ -116,6 +116,15 @@ impl Clock {
         Some(shoe + relation.origin.offset() + relation.ahead_us(shoe).round() as i64)
     }
 
+    /// The same moment by the clock of the shoe; `None` before the first exchange.
+    pub fn to_shoe(&self, host: Micros) -> Option<Micros> {
+        let relation = self.relation?;
+        let guess = host + relation.origin.offset().saturating_neg();
+        // The clocks drift apart slowly: what is left after this is less than a microsecond.
+        let ahead_us = relation.ahead_us(guess) / (1.0 + relation.drift);
+        Some(guess + -ahead_us.round() as i64)
+    }
+
     /// How much faster the laptop's clock runs. **Units:** s/s.
     pub fn drift(&self) -> Option<f64> {
         self.relation.map(|relation| relation.drift)

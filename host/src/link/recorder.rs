@@ -3,6 +3,7 @@
 //! A thread of its own writes, behind a bounded buffer: a slow disk delays nobody, a full one stops the recording and
 //! nothing else. Once in a second everything is handed to the system, so that a program that is killed leaves what it heard.
 
+use crate::fixes::Fix;
 use crate::recording::RecordingError;
 use crate::recording::heard::Heard;
 use crate::recording::mcap::Writer;
@@ -25,6 +26,7 @@ enum Entry {
     About(BTreeMap<String, String>),
     Building(Vec<Lines>, Micros),
     Moment(Box<Moment>),
+    Fix(Box<Fix>),
 }
 
 /// A recording that goes on.
@@ -76,6 +78,11 @@ impl Recorder {
         self.send(Entry::Moment(Box::new(moment)))
     }
 
+    /// Records what another source said of the place.
+    pub fn fix(&mut self, fix: Fix) -> bool {
+        self.send(Entry::Fix(Box::new(fix)))
+    }
+
     fn send(&mut self, entry: Entry) -> bool {
         match self.entries.try_send(entry) {
             Ok(()) => true,
@@ -113,6 +120,7 @@ fn write(mut writer: Writer, entries: &Receiver<Entry>) -> Result<u64, Recording
             Ok(Entry::About(about)) => writer.about(&about)?,
             Ok(Entry::Building(lines, time)) => writer.building(&lines, time)?,
             Ok(Entry::Moment(moment)) => writer.moment(&moment)?,
+            Ok(Entry::Fix(fix)) => writer.fix(&fix)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return writer.finish(),
         }

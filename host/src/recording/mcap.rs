@@ -2,8 +2,8 @@
 //!
 //! # What is inside
 //! One channel for each kind of [message](super::message): `/imu`, and where known `/truth/pose`, `/truth/stance`,
-//! `/step`; of a live walk also `/shoe`, which holds every [message of the shoe](super::heard); of a walk that was followed in
-//! a building also what [viewers show](super::scene) of it. Their schemas are
+//! `/step`; `/fix` for [what other sources said](super::fix) of the place; of a live walk also `/shoe`, which holds every
+//! [message of the shoe](super::heard); of a walk that was followed in a building also what [viewers show](super::scene) of it. Their schemas are
 //! `ros2msg` text, their messages CDR. The record of metadata `sohle` holds name, sensor range and version; the record
 //! `about` whatever the writer had to say (parameters, seeds, origin). Nothing is compressed: the decoders of MCAP's
 //! compressions are C code.
@@ -21,6 +21,7 @@ use super::message::{Encoder, Message};
 use super::scene::{self, Lines, Moment, Shown};
 use super::truth::{TruthPose, TruthStance};
 use super::{Recording, SensorRange, live, table};
+use crate::fixes::Fix;
 use mcap::records::{ChunkHeader, MessageHeader, Metadata, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, WriteOptions};
@@ -171,6 +172,11 @@ impl Writer {
         self.message(step)
     }
 
+    /// Appends what another source said of the place.
+    pub fn fix(&mut self, fix: &Fix) -> Result<(), RecordingError> {
+        self.message(fix)
+    }
+
     /// Appends the plan of a building, for viewers.
     pub fn building(&mut self, lines: &[Lines], time: Micros) -> Result<(), RecordingError> {
         self.shown(&scene::building(lines, time), time)
@@ -289,6 +295,9 @@ pub fn write_shown(
     for step in &recording.steps {
         writer.step(step)?;
     }
+    for fix in &recording.fixes {
+        writer.fix(fix)?;
+    }
     if let Some(first) = moments.first() {
         writer.building(building, first.time)?;
     }
@@ -317,6 +326,7 @@ enum Kind {
     Stance,
     Step,
     Heard,
+    Fix,
 }
 
 /// What has been read so far.
@@ -439,6 +449,7 @@ impl Contents {
             TruthStance::SCHEMA => (Kind::Stance, TruthStance::DEFINITION),
             Step::SCHEMA => (Kind::Step, Step::DEFINITION),
             Heard::SCHEMA => (Kind::Heard, Heard::DEFINITION),
+            Fix::SCHEMA => (Kind::Fix, Fix::DEFINITION),
             _ => return Ok(None),
         };
         if definition != expected.as_bytes() || channel.message_encoding != MESSAGE_ENCODING {
@@ -470,6 +481,7 @@ impl Contents {
                 }
                 self.heard.push(decode(bytes, self.heard.len())?);
             }
+            Some(Kind::Fix) => recording.fixes.push(decode(bytes, recording.fixes.len())?),
             Some(Kind::Step) => recording.steps.push(decode(bytes, recording.steps.len())?),
             Some(Kind::Pose) => {
                 let poses = &mut recording.truth.get_or_insert_default().poses;
@@ -552,8 +564,9 @@ fn decode<M: Message>(bytes: &[u8], index: usize) -> Result<M, Problem> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixes::{Frame, Measured};
     use crate::recording::{self, SimulatedTruth};
-    use nalgebra::{Matrix4, Vector3};
+    use nalgebra::{Matrix2, Matrix4, Vector3};
     use proptest::prelude::*;
     use proptest::sample::Index;
     use sohle_shared::sample::ClippedSamples;
@@ -591,6 +604,12 @@ mod tests {
         }
     }
 
+    fn fix(source: &str, floor: Option<i32>) -> Fix {
+        let measured = Measured::Position { place: [9.99, 53.54], covariance: Matrix2::new(9.0, 1.0, 1.0, 4.0) };
+        let [time, arrived] = [1_500_000, 3_500_000].map(Micros);
+        Fix { time, arrived, source: source.into(), frame: Frame::Geographic, measured, floor }
+    }
+
     /// A recording with everything in it.
     fn full(count: i64) -> Recording {
         let stance = TruthStance {
@@ -611,6 +630,7 @@ mod tests {
                 stances: vec![stance, stance],
             }),
             steps: vec![step(0), step(1)],
+            fixes: vec![fix("5g", Some(-1)), fix("uwb", None)],
             again: None,
             orders: Vec::new(),
             metadata: BTreeMap::from([("parameters".to_owned(), "gain = 0.1\n[stance]\n".to_owned())]),

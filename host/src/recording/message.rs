@@ -61,7 +61,23 @@ impl Encoder {
         self.0.extend(bytes);
     }
 
-    fn f64s(&mut self, values: &[f64]) {
+    /// A text; its number is aligned when nothing narrower than four bytes comes before.
+    pub(super) fn string(&mut self, text: &str) {
+        // CDR ends texts with a zero, so none may be inside.
+        let text = text.replace('\0', " ");
+        self.0.extend((text.len() as u32 + 1).to_le_bytes());
+        self.0.extend(text.bytes().chain([0]));
+    }
+
+    pub(super) fn u32(&mut self, value: u32) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    pub(super) fn i32(&mut self, value: i32) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    pub(super) fn f64s(&mut self, values: &[f64]) {
         self.0.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     }
 
@@ -69,7 +85,7 @@ impl Encoder {
         self.0.extend(values.into_iter().flat_map(|value| value.to_le_bytes()));
     }
 
-    fn flags<const N: usize>(&mut self, flags: [bool; N]) {
+    pub(super) fn flags<const N: usize>(&mut self, flags: [bool; N]) {
         self.0.extend(flags.map(u8::from));
     }
 }
@@ -96,11 +112,25 @@ impl<'a> Decoder<'a> {
         self.bytes().map(i64::from_le_bytes).map(Micros)
     }
 
+    /// As [`Encoder::string`] wrote it.
+    pub(super) fn string(&mut self) -> Option<&'a str> {
+        let (end, text) = self.sequence()?.split_last()?;
+        (*end == 0).then(|| std::str::from_utf8(text).ok()).flatten()
+    }
+
+    pub(super) fn u32(&mut self) -> Option<u32> {
+        self.bytes().map(u32::from_le_bytes)
+    }
+
+    pub(super) fn i32(&mut self) -> Option<i32> {
+        self.bytes().map(i32::from_le_bytes)
+    }
+
     fn f64(&mut self) -> Option<f64> {
         self.bytes().map(f64::from_le_bytes)
     }
 
-    fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
+    pub(super) fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
         let mut values = [0.0; N];
         for value in &mut values {
             *value = self.f64()?;
@@ -120,7 +150,7 @@ impl<'a> Decoder<'a> {
         self.bytes().map(u16::from_le_bytes)
     }
 
-    fn flag(&mut self) -> Option<bool> {
+    pub(super) fn flag(&mut self) -> Option<bool> {
         match self.bytes()? {
             [0] => Some(false),
             [1] => Some(true),

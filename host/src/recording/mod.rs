@@ -7,6 +7,7 @@ pub mod axes;
 mod check;
 pub mod counts;
 pub mod error;
+mod fix;
 #[cfg(test)]
 mod fuzz;
 mod gaitmap;
@@ -33,6 +34,7 @@ pub use mapping::Mapping;
 pub use profile::{Preset, Profile, Source};
 pub use truth::{SimulatedTruth, TruthPose, TruthStance};
 
+use crate::fixes::Fix;
 use sohle_shared::sample::ImuSample;
 use sohle_shared::step::Step;
 use sohle_shared::tracker::Order;
@@ -80,6 +82,8 @@ pub struct Recording {
     pub truth: Option<SimulatedTruth>,
     /// Steps recorded with the samples; only from the project's own format.
     pub steps: Vec<Step>,
+    /// What other sources said of the place, in the order of the file; only from the project's own format.
+    pub fixes: Vec<Fix>,
     /// What came of computing a live walk again; only from the project's own format, and only if the shoe's counts are in it.
     pub again: Option<live::Agreement>,
     /// Orders that the tracker on the shoe got, each with the number of samples before it; only of a live walk whose counts

@@ -71,7 +71,9 @@ impl Listening {
             let number = connection.tell(Action::Order(Order::FloorMode(mode)));
             show.mode_sent(number, mode);
         }
-        if let Some(happening) = connection.next(patience) {
+        let happening = connection.next(patience);
+        show.hear(connection);
+        if let Some(happening) = happening {
             watch(&happening, connection);
             show.take(happening, connection);
         }

@@ -2,13 +2,16 @@
 
 mod listening;
 mod places;
+mod positions;
 mod show;
 mod words;
 
 pub use listening::Listening;
 pub use places::{Places, Told};
+pub use positions::Positions;
 pub use show::Show;
 
+use super::fixes::Source;
 use super::located::InBuilding;
 use super::shown::{Enough, Shoe, Watched};
 use super::{Error, parameters, window};
@@ -65,6 +68,10 @@ pub struct Args {
     format: Format,
     #[command(flatten)]
     place: InBuilding,
+    /// Positions and ranges of other sources, a JSON object to a line (docs/fixes.md): of a file, the standard input, or
+    /// datagrams to HOST:PORT
+    #[arg(long, value_name = "FILE|-|udp:HOST:PORT")]
+    fixes: Option<Source>,
     /// Draws the floors with the walk into this folder at the end
     #[arg(long, value_name = "DIR", requires = "building")]
     pictures: Option<PathBuf>,
@@ -104,14 +111,16 @@ pub fn run(args: Args) -> Result<(), Error> {
     let asked = stop.clone();
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
 
-    let places = Places::prepare(&args.place)?;
+    let mut places = Places::prepare(&args.place)?;
+    let hear = |source| Positions::prepare(source, places.as_mut(), args.quiet);
+    let positions = args.fixes.as_ref().map(hear).transpose()?;
     let start = places.as_ref().map(|places| places.follower().settings().start.clone()).unwrap_or_default();
     let recording = if args.no_record { None } else { Some(path(args.out.as_deref())) };
     let recorder = recording.as_deref().map(begin).transpose()?;
     let opened = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let connection = Connection::open(args.address.clone());
     let opened_us = i64::try_from(opened.as_micros()).unwrap_or_default();
-    let show = Show::new(&args, recorder, places, opened_us);
+    let show = Show::new(&args, recorder, (places, positions), opened_us);
     show.head()?;
     let listening = Listening::new(connection, show, values, args.raw);
     let steps = args.steps;

@@ -1,5 +1,6 @@
 //! The steps of a live shoe in a building: followed as they come, and the shoe is told its floor mode.
 
+use crate::cli::fixes::Incoming;
 use crate::cli::located::{Following, InBuilding};
 use crate::cli::{Error, live::words};
 use crate::follow::{self, Follower, mode_word, scene};
@@ -15,7 +16,7 @@ use std::path::Path;
 
 /// Steps that may wait for the clock of the shoe to be known. They come first when the line is good; a clock that is still not
 /// known then is not waited for.
-const WAITING: usize = 64;
+pub(super) const WAITING: usize = 64;
 
 /// What the map knew so long ago says nothing of the ground under the next stance: a stride takes this long.
 /// **Units:** microseconds.
@@ -57,6 +58,21 @@ impl Places {
     /// Who follows.
     pub fn follower(&self) -> &Follower {
         self.following.follower()
+    }
+
+    /// Hears of positions of other sources from now on.
+    pub fn hearing(&mut self, incoming: Incoming) {
+        self.following.hearing(Some(incoming));
+    }
+
+    /// The positions of other sources.
+    pub fn incoming(&mut self) -> Option<&mut Incoming> {
+        self.following.incoming()
+    }
+
+    /// Hears what has arrived before a time by the clock of the shoe.
+    pub fn hear(&mut self, until: Micros) {
+        self.following.hear(until);
     }
 
     /// The walk begins at `start`, now.
@@ -144,11 +160,12 @@ impl Places {
     }
 
     /// For the summary.
-    pub fn summary(&self) -> Json {
+    pub fn summary(&mut self) -> Json {
+        let positions = self.following.incoming().map(|incoming| incoming.counts());
         let estimate = self.following.follower().estimate();
         json!({
             "state": estimate.state, "followed": self.following.follower().path().len(), "before_start": self.before,
-            "unusual": self.unusual, "floor_modes_told": self.shoe.told,
+            "unusual": self.unusual, "floor_modes_told": self.shoe.told, "positions": positions,
         })
     }
 

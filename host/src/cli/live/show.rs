@@ -1,6 +1,7 @@
 //! What `sohle live` shows, and what has been so far.
 
 use super::places::{Places, Told};
+use super::positions::Positions;
 use super::{Args, Format, words};
 use crate::cli::{Error, print};
 use crate::link::Connection;
@@ -9,7 +10,7 @@ use crate::link::event::{Event, mismatch};
 use crate::link::recorder::Recorder;
 use crate::recording::heard::Heard;
 use crate::recording::live::BEGAN;
-use serde_json::json;
+use serde_json::{Value as Json, json};
 use sohle_shared::step::FloorMode;
 use sohle_shared::time::Micros;
 use sohle_shared::wire::message::{FromShoe, Level, Raw, RawItem, SentStep, Status};
@@ -43,6 +44,8 @@ pub struct Show {
     pub fault: Option<String>,
     /// The walk in a building.
     pub places: Option<Places>,
+    /// Positions of other sources.
+    positions: Option<Positions>,
     /// The standard output belongs to the lines of the places.
     output_taken: bool,
     /// Where pictures of the walk go.
@@ -56,10 +59,16 @@ pub struct Show {
 
 impl Show {
     /// Nothing has been so far. `opened_us` is when the connection was begun, in microseconds since the beginning of 1970.
-    pub fn new(args: &Args, recorder: Option<Recorder>, places: Option<Places>, opened_us: i64) -> Self {
+    pub fn new(
+        args: &Args,
+        recorder: Option<Recorder>,
+        (places, positions): (Option<Places>, Option<Positions>),
+        opened_us: i64,
+    ) -> Self {
         Self {
             recorder,
             places,
+            positions,
             opened_us,
             format: args.format,
             quiet: args.quiet,
@@ -176,6 +185,17 @@ impl Show {
         }
     }
 
+    /// Takes in the positions that have come.
+    pub fn hear(&mut self, connection: &Connection) {
+        let Some(positions) = &mut self.positions else { return };
+        let fixes = positions.hear(self.places.as_mut(), connection, self.opened_us);
+        if let Some(recorder) = &mut self.recorder {
+            fixes.into_iter().for_each(|fix| _ = recorder.fix(fix));
+        }
+        let told = positions.known(connection, self.opened_us);
+        told.iter().for_each(|(text, object)| self.print(text, object));
+    }
+
     fn step(&mut self, boot: u32, id: u32, packed: &PackedStep, connection: &Connection) {
         let step = packed.unpack();
         match self.last {
@@ -200,18 +220,26 @@ impl Show {
         if let Some(places) = &mut self.places {
             let told = places.step(&step, self.opened_us, connection);
             self.tell(told);
+        } else if let Some(positions) = &mut self.positions {
+            positions.step(&step);
+            self.hear(connection);
         }
+    }
+
+    /// Prints what is said of a place.
+    fn print(&self, text: &str, object: &Json) {
+        // Nobody who reads is no reason to stop recording.
+        let _ = match self.format {
+            _ if self.quiet || self.output_taken => Ok(()),
+            Format::Table => print(text),
+            Format::Json => print(&format!("{object}\n")),
+        };
     }
 
     /// Tells where somebody is, and records it for viewers.
     fn tell(&mut self, told: Vec<Told>) {
         for Told { text, object, moment } in told {
-            // Nobody who reads is no reason to stop recording.
-            let _ = match self.format {
-                _ if self.quiet || self.output_taken => Ok(()),
-                Format::Table => print(&text),
-                Format::Json => print(&format!("{object}\n")),
-            };
+            self.print(&text, &object);
             let Some(recorder) = &mut self.recorder else { continue };
             if let Some(places) = self.places.as_ref().filter(|_| !self.plan_recorded) {
                 self.plan_recorded = recorder.building(places.plan(), moment.time);
@@ -308,6 +336,7 @@ impl Show {
         }
         let counters = connection.session().counters();
         let bound = connection.session().clock().error_bound().map(|bound| bound * 1e3);
+        let in_building = self.places.as_mut().map(Places::summary);
         self.delays.sort_by(f64::total_cmp);
         let (median, longest) = (self.delays.get(self.delays.len() / 2).copied(), self.delays.last().copied());
         match self.format {
@@ -323,7 +352,7 @@ impl Show {
                     "lateness_us": self.status.map(|status| status.lateness_us),
                     "load_max": self.load_max,
                     "asleep": self.status.map(|status| status.asleep), "sleeps": self.status.map(|status| status.sleeps),
-                    "places": self.places.as_ref().map(Places::summary),
+                    "places": in_building, "positions": self.positions.as_ref().and_then(Positions::counts),
                 })
             ))?,
             Format::Table => {
@@ -348,6 +377,11 @@ impl Show {
                     }
                 ))?;
             }
+        }
+        if let Some(told) = self.positions.take().map(Positions::finish).transpose()?.flatten()
+            && self.format == Format::Table
+        {
+            self.result(&told)?;
         }
         let placed = match self.places.take() {
             Some(places) => places.finish(self.pictures.as_deref()).and_then(|told| match self.format {

@@ -11,6 +11,7 @@ use crate::recording::Recording;
 use crate::recording::scene::{Lines, Moment};
 use serde_json::Value;
 use sohle_shared::step::Step;
+use sohle_shared::time::Micros;
 use std::path::Path;
 
 /// The estimate after each step, a JSON object to a line.
@@ -51,6 +52,18 @@ impl Following {
         self.incoming = incoming;
     }
 
+    /// The positions of other sources.
+    pub fn incoming(&mut self) -> Option<&mut Incoming> {
+        self.incoming.as_mut()
+    }
+
+    /// Hears the positions that have arrived before a time.
+    pub fn hear(&mut self, until: Micros) {
+        if let Some(incoming) = &mut self.incoming {
+            incoming.hear(until, |observation| _ = self.follower.observe(observation));
+        }
+    }
+
     /// What viewers show of it: the plan, and the moments that were kept.
     pub fn shown(&self) -> (Vec<Lines>, &[Moment]) {
         (scene::building(self.follower.building()), self.moments.as_deref().unwrap_or_default())
@@ -79,6 +92,9 @@ impl Following {
         self.unix_us.push(unix_us);
         let mut object = follow::line(&self.follower, &said, self.projection.as_ref());
         object["unix_us"] = unix_us.into();
+        if let Some(incoming) = &self.incoming {
+            object["positions"] = incoming.object(self.projection.as_ref()).into();
+        }
         let line = object.to_string();
         self.outputs.line(&line);
         if let Some(lines) = &mut self.lines {
@@ -124,11 +140,11 @@ impl Following {
         if let Some(truth) = truth {
             told += &format!("\n{}", summary::judged(&follower, truth));
         }
-        let Some(folder) = folder else { return Ok(told) };
-        file::folder(folder)?;
         if let Some(incoming) = incoming {
             told += &format!("\n{}", incoming.finish(folder)?);
         }
+        let Some(folder) = folder else { return Ok(told) };
+        file::folder(folder)?;
         let mut files = Vec::new();
         if let Some(lines) = lines {
             file::write(&folder.join(STREAM), lines.as_bytes())?;

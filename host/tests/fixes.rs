@@ -1,0 +1,203 @@
+//! Steps with positions of other sources, from outside: the suite, good and bad lines, and what a recording keeps of them.
+
+use nalgebra::{Matrix4, Vector3};
+use sohle::recording::{Recording, mcap, recordings_dir};
+use sohle_shared::sample::ClippedSamples;
+use sohle_shared::step::{FloorMode, Step, StepQuality};
+use sohle_shared::time::Micros;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn sohle(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sohle")).args(arguments).current_dir(folder).output().expect("it starts")
+}
+
+/// Runs a command that must succeed; what it says on both outputs.
+#[track_caller]
+fn said(folder: &Path, arguments: &[&str]) -> (String, String) {
+    let output = sohle(folder, arguments);
+    let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("it is text"));
+    assert!(output.status.success(), "{out}{err}");
+    (out, err)
+}
+
+/// Twenty strides of 1.2 m along the lower corridor of the twin, to the east from (4, 7.1) m.
+fn steps() -> Vec<Step> {
+    let step = |index: u32| Step {
+        index,
+        stance_start: Micros(i64::from(index) * 1_100_000),
+        stance_end: Micros(i64::from(index) * 1_100_000 + 400_000),
+        displacement: Vector3::new(if index == 0 { 0.0 } else { 1.2 }, 0.0, 0.0),
+        turn: 0.0,
+        covariance: Matrix4::identity() * 1e-4,
+        mode: FloorMode::Level,
+        quality: StepQuality::default(),
+        clipped: ClippedSamples::default(),
+    };
+    (0..=20).map(step).collect()
+}
+
+/// Where they lead, as a source tells it after each of them.
+fn positions(source: &str, off_m: f64) -> String {
+    let line = |(index, step): (usize, &Step)| {
+        let (time, x) = (step.stance_end.0, 4.0 + 1.2 * index as f64);
+        format!("{{\"time_us\":{time},\"source\":\"{source}\",\"position\":[{x},{}],\"sigma_m\":0.5}}\n", 7.1 + off_m)
+    };
+    steps().iter().enumerate().map(line).collect()
+}
+
+/// A folder with the walk, the twin of the document's building, and these positions.
+fn prepared(lines: &str) -> tempfile::TempDir {
+    let home = tempfile::tempdir().expect("a folder");
+    let recording = Recording { name: "walk".into(), steps: steps(), ..Recording::default() };
+    mcap::write(&home.path().join("walk.mcap"), &recording).expect("it can be written");
+    said(home.path(), &["building", "generate", "twin", "twin.geojson"]);
+    std::fs::write(home.path().join("fixes.jsonl"), lines).expect("it can be written");
+    home
+}
+
+/// The last line of the path of this kind.
+fn last(folder: &Path, kind: &str) -> [f64; 2] {
+    let text = std::fs::read_to_string(folder.join("out/fixes.csv")).expect("it was written");
+    let line = text.lines().rfind(|line| line.starts_with(kind)).expect("a line");
+    let cells: Vec<&str> = line.split(',').collect();
+    [2, 3].map(|column| cells[column].parse().expect("a number"))
+}
+
+const IN_TWIN: [&str; 4] = ["--building", "twin.geojson", "--start", "0,4,7.1,0"];
+
+#[test]
+fn the_suite_prints_the_tables_that_are_kept_and_reaches_its_goals() {
+    let recorded = |name: &str| recordings_dir().is_some_and(|folder| folder.join(name).exists());
+    if !recorded("hcu_hamburg") || !recorded("ranging_hymn") {
+        println!("skipped: no recordings");
+        return;
+    }
+    let home = tempfile::tempdir().expect("a folder");
+    let (printed, _) = said(home.path(), &["evaluate", "--suite", "fixes"]);
+    let kept = include_str!("../../tests/fixes.txt");
+    assert_eq!(printed, kept, "if that is meant: sohle evaluate --suite fixes > tests/fixes.txt");
+    let rows = |table: &str, name: &str| -> Vec<Vec<String>> {
+        let lines = kept.split(table).nth(1).expect("the table").lines().skip(1).take_while(|line| !line.is_empty());
+        let cells = lines.filter_map(|line| line.strip_prefix(name).filter(|rest| rest.starts_with("  ")));
+        cells.map(|rest| rest.split_whitespace().map(str::to_owned).collect()).collect()
+    };
+    let number = |text: &str| -> f64 { text.parse().expect("a number") };
+    // Start, rate, RMSE.
+    let eight = |name: &str, rate: &str| -> f64 {
+        let rows = rows("hcu eight, steps and positions", name);
+        number(&rows.iter().find(|row| row[0] == "known" && row[1] == rate).expect("the rate")[2])
+    };
+    for (rate, most) in [("1.000", 0.75), ("0.200", 1.0), ("0.100", 1.2)] {
+        let corrected = eight("smoother, corrected", rate);
+        assert!(corrected <= most && corrected < eight("extended", rate), "{rate}: {corrected}");
+    }
+    // Sigma, extended, live, its 95 %, corrected; then the bounds and their means.
+    let walks = |wrong: &str| rows("simulated walks, wrong with the positions", wrong);
+    for (right, outlying) in walks("nothing").iter().zip(&walks("20 % outliers of 20 m")) {
+        for figure in [2, 4] {
+            assert!(number(&outlying[figure]) <= 1.3 * number(&right[figure]), "{right:?} {outlying:?}");
+        }
+        for mean in [5, 9] {
+            let low = number(right[mean + 1].trim_start_matches('('));
+            let high = number(right[mean + 3].trim_end_matches(')'));
+            assert!((low..=high).contains(&number(&right[mean])), "{right:?}");
+        }
+    }
+    let placed = |name: &str| number(&rows("place of one round of ranges", name)[0][1]);
+    assert!(placed("with a tail") < placed("all believed alike"));
+}
+
+#[test]
+fn without_the_recordings_the_suite_says_so() {
+    let home = tempfile::tempdir().expect("a folder");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sohle"));
+    let output = command.args(["evaluate", "--suite", "fixes"]).env("SOHLE_RECORDINGS", home.path()).output();
+    let output = output.expect("it starts");
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8(output.stderr).expect("it is text");
+    assert!(told.contains("hcu_hamburg/eight_walk is not there"), "{told}");
+}
+
+#[test]
+fn good_lines_place_a_walk_whose_start_nobody_knows() {
+    let home = prepared(&positions("uwb", 0.0));
+    let (told, err) = said(home.path(), &["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
+    assert!(err.is_empty() && told.contains("positions of  all  taken"), "{told}{err}");
+    for kind in ["said", "corrected"] {
+        let [x, y] = last(home.path(), kind);
+        assert!((x - 28.0).hypot(y - 7.1) < 0.5, "{kind} {x} {y}");
+    }
+}
+
+#[test]
+fn each_bad_line_is_told_with_what_is_wrong_and_counted_and_the_rest_is_taken() {
+    let bad = [
+        (r#"{"time_us":5000000,"source":"uwb","frame":"EPSG:3857","position":[1,2],"sigma_m":1}"#, "frame EPSG:3857"),
+        (r#"{"time_us":5000000,"source":"uwb","frame":"moon","position":[1,2],"sigma_m":1}"#, "the frame 'moon'"),
+        (r#"{"time_us":5000000,"source":"uwb","frame":"EPSG:4326","position":[10,53],"sigma_m":1}"#, "no georeference"),
+        (r#"{"time_us":5000000,"source":"uwb","position":[566578,5932830],"sigma_m":1}"#, "is it in another frame?"),
+        (
+            r#"{"time_us":5000000,"source":"uwb","position":[9,7],"sigma_m":1,"floor":9}"#,
+            "floor 9 is not in the building",
+        ),
+        (
+            r#"{"time_us":9000000,"arrived_us":5000000,"source":"uwb","position":[9,7],"sigma_m":1}"#,
+            "4.0 s after it arrived",
+        ),
+        (r#"{"time_us":5000000,"source":"uwb","position":[9,7],"sigma_m":0}"#, "its covariance is none"),
+        (r#"{"time_us":5000000,"source":"uwb","position":[9,7],"sigma_m":-1}"#, "its covariance is none"),
+        (
+            r#"{"time_us":5000000,"source":"uwb","position":[9,7],"covariance_m2":[[1,2],[2,1]]}"#,
+            "its covariance is none",
+        ),
+        (r#"{"time_us":5000000,"position":[9,7],"sigma_m":1,"colour":"red"}"#, "unknown field `colour`"),
+    ];
+    let mut lines: String = bad.iter().map(|(line, _)| format!("{line}\n")).collect();
+    lines += &positions("uwb", 0.0);
+    let home = prepared(&lines);
+    let replay = ["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"];
+    let (told, err) = said(home.path(), &[&replay[..], &IN_TWIN].concat());
+    for ((line, what), (number, message)) in bad.iter().zip(err.lines().enumerate()) {
+        let begins = format!("fixes.jsonl, line {}: ", number + 1);
+        assert!(message.starts_with(&begins) && message.contains(what), "{line}: {message}");
+        assert_eq!(message.matches("line").count() - message.matches("fixes.jsonl").count(), 1, "{message}");
+    }
+    assert_eq!(err.lines().count(), bad.len(), "{err}");
+    let row: Vec<&str> =
+        told.lines().find_map(|line| line.strip_prefix("uwb ")).expect("a row").split_whitespace().collect();
+    assert_eq!(row[..5], ["29", "21", "0", "0", "8"], "{told}");
+    assert!(told.contains("2 lines were no fixes") && told.contains("floor unknown 1"), "{told}");
+    let [x, y] = last(home.path(), "said");
+    assert!((x - 28.0).hypot(y - 7.1) < 0.5, "{x} {y}");
+}
+
+#[test]
+fn sources_that_contradict_each_other_are_told_of_once() {
+    let home = prepared(&(positions("uwb", 2.5) + &positions("wifi", -2.5)));
+    let (_, err) = said(home.path(), &["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
+    let contradictions: Vec<_> = err.lines().filter(|line| line.contains("contradict each other")).collect();
+    assert!(matches!(contradictions[..], [line] if line.contains("uwb and wifi")), "{err}");
+}
+
+#[test]
+fn a_recording_keeps_what_was_said_and_is_replayed_with_it() {
+    let home = prepared(&positions("uwb", 0.0));
+    let folder = home.path();
+    let replay = ["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"];
+    said(folder, &[&replay[..], &IN_TWIN].concat());
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("it was written");
+    let (path, places) = (read("out/fixes.csv"), read("out/places.jsonl"));
+    let recorded = sohle::recording::open(&folder.join("out/recording.mcap"), None).expect("it is a recording");
+    assert_eq!(recorded.fixes.len(), 21);
+    assert_eq!(&*recorded.fixes[3].source, "uwb");
+    std::fs::rename(folder.join("out/recording.mcap"), folder.join("kept.mcap")).expect("it is there");
+    let (told, _) = said(folder, &[&["replay", "kept.mcap", "--out", "out"][..], &IN_TWIN].concat());
+    assert!(told.contains("positions of  all  taken"), "{told}");
+    assert_eq!((read("out/fixes.csv"), read("out/places.jsonl")), (path, places));
+    // Others come in their place.
+    std::fs::write(folder.join("fixes.jsonl"), positions("wifi", 0.0)).expect("it can be written");
+    said(folder, &["replay", "kept.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
+    let recorded = sohle::recording::open(&folder.join("out/recording.mcap"), None).expect("it is a recording");
+    assert!(recorded.fixes.len() == 21 && recorded.fixes.iter().all(|fix| &*fix.source == "wifi"));
+}
