@@ -212,15 +212,28 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
             (table::phone(&rows).text(), serde_json::json!({"phone": rows}))
         }
         Suite::Fixes => {
-            let walk = phone::walk::eight()?;
-            let comparison = fixes::eight::Comparison::of(&walk, &crate::phone::Parameters::default());
+            // The first has positions of its own.
+            let walks = phone::walk::all()?;
+            let steps = crate::phone::Parameters::default();
+            let [eight, mall @ ..] = &walks[..] else { return Ok(()) };
+            let comparison = fixes::eight::Comparison::of(eight, &steps);
             if let Some(folder) = &args.pictures {
-                drawn::fixes(&walk, &comparison, folder)?;
+                drawn::fixes(eight, &comparison, folder)?;
             }
             let rows = comparison.rows(&default, args.seed)?;
+            let mall = fixes::mall::rows(mall, &steps, args.seed);
             let walks = fixes::walks::rows(args.seed)?;
-            let text = [table::eight(&rows), table::walks(&walks)].map(|table| table.text()).join("\n");
-            (text, serde_json::json!({"eight": rows, "walks": walks}))
+            let recorded = fixes::ranges::Recorded::read()?;
+            let (ranges, placed) = (recorded.rows(), recorded.placed());
+            let tables = [
+                table::eight(&rows),
+                table::mall(&mall),
+                table::walks(&walks),
+                table::ranges(&ranges),
+                table::placed(&placed),
+            ];
+            let text = tables.map(|table| table.text()).join("\n");
+            (text, serde_json::json!({"eight": rows, "mall": mall, "walks": walks, "ranges": ranges, "placed": placed}))
         }
         Suite::Graph => graphs(args, default)?,
     };

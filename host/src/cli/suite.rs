@@ -5,7 +5,7 @@ pub mod drawn;
 use super::table::Table;
 use crate::evaluation::building::suite::{Errors, KnownRow, OtherRow};
 use crate::evaluation::building::unknown::{LostRow, UnknownRow};
-use crate::evaluation::fixes::{Bounds, Figures, eight, walks};
+use crate::evaluation::fixes::{Bounds, Figures, eight, mall, ranges, walks};
 use crate::evaluation::graph;
 use crate::evaluation::phone::suite::Row;
 
@@ -284,6 +284,43 @@ pub fn graph_times(rows: &[graph::suite::Row]) -> Table {
     let mut table = Table::new("time of a step", &["building", "us"]);
     for row in rows {
         table.row(row.method, vec![row.site.to_owned(), format!("{:.1}", row.step_us)]);
+    }
+    table
+}
+
+/// Recorded walks with simulated positions.
+pub fn mall(rows: &[mall::Row]) -> Table {
+    let headings = ["extended RMSE m", "smoother m", "95 % m", "corrected m", "95 % m"];
+    let mut table = Table::new("mall, simulated positions Hz", &headings);
+    for row in rows {
+        let (live, corrected) = (&row.live, &row.corrected);
+        let figures = [row.extended.rmse_m, live.rmse_m, live.errors.p95_m, corrected.rmse_m, corrected.errors.p95_m];
+        table.row(format!("{:.1}", row.rate_hz), figures.map(|metres| format!("{metres:.2}")).to_vec());
+    }
+    table
+}
+
+/// How far recorded ranges are off.
+pub fn ranges(rows: &[ranges::Row]) -> Table {
+    let headings = ["ranges", "offset m", "scale m", "beyond 3 scales %", "half of those beyond m"];
+    let mut table = Table::new("UWB ranges at surveyed points", &headings);
+    for row in rows {
+        let mut cells = vec![row.count.to_string()];
+        cells.extend([row.offset_m, row.scale_m].map(|metres| format!("{metres:.3}")));
+        cells.extend([format!("{:.2}", row.tail_percent), format!("{:.2}", row.tail_m)]);
+        table.row(row.of.clone(), cells);
+    }
+    table
+}
+
+/// Places that come of recorded ranges.
+pub fn placed(rows: &[ranges::Placed]) -> Table {
+    let headings = ["places", "mean m", "75 % m", "95 % m", "worst m"];
+    let mut table = Table::new("place of one round of ranges", &headings);
+    for ranges::Placed { ranges, errors } in rows {
+        let mut cells = vec![errors.count.to_string()];
+        cells.extend([errors.mean_m, errors.p75_m, errors.p95_m, errors.worst_m].map(|metres| format!("{metres:.2}")));
+        table.row(*ranges, cells);
     }
     table
 }

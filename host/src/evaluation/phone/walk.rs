@@ -113,22 +113,13 @@ impl PhoneWalk {
     }
 }
 
-/// All recorded walks.
+/// All recorded walks; the first, along an eight in the university, has positions of another source.
 ///
 /// # Errors
 /// When the folder or one of the walks is not there, or cannot be read.
 pub fn all() -> Result<Vec<PhoneWalk>, Error> {
     let home = recordings_dir().ok_or(Error::NoRecordings)?;
     SOURCES.iter().map(|source| PhoneWalk::read(&home, source)).collect()
-}
-
-/// The walk along an eight in the university, the only one with positions of another source.
-///
-/// # Errors
-/// As [`all`].
-pub fn eight() -> Result<PhoneWalk, Error> {
-    let home = recordings_dir().ok_or(Error::NoRecordings)?;
-    PhoneWalk::read(&home, &SOURCES[0])
 }
 
 #[cfg(test)]
