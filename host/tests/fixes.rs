@@ -92,6 +92,12 @@ fn the_suite_prints_the_tables_that_are_kept_and_reaches_its_goals() {
         let corrected = eight("smoother, corrected", rate);
         assert!(corrected <= most && corrected < eight("extended", rate), "{rate}: {corrected}");
     }
+    // With the plan. Whoever stamped the way-points did it half a second late by every method; without that it is within the goal.
+    for (rate, most) in [("1.000", 0.6), ("0.200", 0.7), ("0.100", 0.8)] {
+        let row = rows("hcu eight, steps and positions", "map, corrected");
+        let row = row.iter().find(|row| row[1] == rate).expect("the rate");
+        assert!(number(&row[7]) <= most && number(&row[2]) <= eight("smoother, corrected", rate), "{row:?}");
+    }
     // Sigma, extended, live, its 95 %, corrected; then the bounds and their means.
     let walks = |wrong: &str| rows("simulated walks, wrong with the positions", wrong);
     for (right, outlying) in walks("nothing").iter().zip(&walks("20 % outliers of 20 m")) {
@@ -131,6 +137,26 @@ fn good_lines_place_a_walk_whose_start_nobody_knows() {
 }
 
 #[test]
+fn the_answer_is_that_of_the_plan_where_it_knows_one_and_of_the_positions_where_it_does_not() {
+    let home = prepared(&positions("uwb", 0.0));
+    let last = |start: &str| -> serde_json::Value {
+        let replay = ["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out", "--building", "twin.geojson"];
+        said(home.path(), &[&replay[..], &["--start", start]].concat());
+        let lines = std::fs::read_to_string(home.path().join("out/places.jsonl")).expect("it was written");
+        serde_json::from_str(lines.lines().last().expect("a line")).expect("JSON")
+    };
+    let known = last("0,4,7.1,0");
+    assert_eq!((&known["state"], &known["answer"]), (&"located".into(), &"map".into()), "{known}");
+    // The floors of the twin are alike, and the source does not name one.
+    let unknown = last("anywhere");
+    assert_eq!((&unknown["state"], &unknown["answer"]), (&"several_places".into(), &"positions".into()), "{unknown}");
+    for place in [&known["positions"], &unknown["positions"]] {
+        let [x, y] = [0, 1].map(|axis| place["position_m"][axis].as_f64().expect("a number"));
+        assert!((x - 28.0).hypot(y - 7.1) < 0.5, "{place}");
+    }
+}
+
+#[test]
 fn each_bad_line_is_told_with_what_is_wrong_and_counted_and_the_rest_is_taken() {
     let bad = [
         (r#"{"time_us":5000000,"source":"uwb","frame":"EPSG:3857","position":[1,2],"sigma_m":1}"#, "frame EPSG:3857"),
@@ -161,7 +187,7 @@ fn each_bad_line_is_told_with_what_is_wrong_and_counted_and_the_rest_is_taken() 
     for ((line, what), (number, message)) in bad.iter().zip(err.lines().enumerate()) {
         let begins = format!("fixes.jsonl, line {}: ", number + 1);
         assert!(message.starts_with(&begins) && message.contains(what), "{line}: {message}");
-        assert_eq!(message.matches("line").count() - message.matches("fixes.jsonl").count(), 1, "{message}");
+        assert_eq!(message.matches("line").count(), 1, "{message}");
     }
     assert_eq!(err.lines().count(), bad.len(), "{err}");
     let row: Vec<&str> =

@@ -161,11 +161,11 @@ fn way(events: &[serde_json::Value]) -> Vec<(i64, [f64; 2])> {
     let steps = events.iter().filter(|event| event["event"] == "step");
     steps
         .map(|step| {
-            let [x, y] = [0, 1].map(|axis| step["displacement_m"][axis].as_f64().unwrap());
+            let [x, y] = [0, 1].map(|axis| step["displacement_m"][axis].as_f64().expect("a number"));
             let (sin, cos) = f64::sin_cos(heading);
             place = [place[0] + cos * x - sin * y, place[1] + sin * x + cos * y];
-            heading += step["turn_rad"].as_f64().unwrap();
-            (step["stance_end_us"].as_i64().unwrap(), place)
+            heading += step["turn_rad"].as_f64().expect("a number");
+            (step["stance_end_us"].as_i64().expect("a number"), place)
         })
         .collect()
 }
@@ -180,13 +180,13 @@ fn positions(way: &[(i64, [f64; 2])]) -> Vec<String> {
 
 /// Runs `sohle live` at a shoe that has walked and stands since; all it says.
 fn heard(more: &[&str]) -> Vec<serde_json::Value> {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = format!("tcp:127.0.0.1:{}", listener.local_addr().unwrap().port());
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = format!("tcp:127.0.0.1:{}", listener.local_addr().expect("it has one").port());
     std::thread::spawn(move || stand_later(&listener));
     let live = sohle(&[&["live", &address, "--format", "json"], more].concat());
     let (out, err) = (String::from_utf8_lossy(&live.stdout), String::from_utf8_lossy(&live.stderr));
     assert!(live.status.success(), "{out}{err}");
-    out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    out.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
 #[test]

@@ -192,11 +192,13 @@ fn spread(figures: &Figures) -> Vec<String> {
 
 /// The recorded walk with positions (Fix, 3.4).
 pub fn eight(rows: &[eight::Row]) -> Table {
-    let headings = ["start", "positions Hz", "RMSE m", "75 % m", "95 % m", "worst m"];
+    let headings =
+        ["start", "positions Hz", "RMSE m", "75 % m", "95 % m", "worst m", "stamped late s", "RMSE without m"];
     let mut table = Table::new("hcu eight, steps and positions", &headings);
     for row in rows {
         let mut cells = vec![row.start.to_owned(), format!("{:.3}", row.rate_hz)];
         cells.extend(spread(&row.figures));
+        cells.extend([format!("{:.1}", row.late_s), format!("{:.2}", row.timed_m)]);
         table.row(row.method, cells);
     }
     table

@@ -36,7 +36,9 @@ bool floor_known
 ";
 
     fn time(&self) -> Micros {
-        self.arrived
+        // On the time line it stands where it was heard.
+        let Self { arrived, .. } = self;
+        *arrived
     }
 
     fn put(&self, out: &mut Encoder) {

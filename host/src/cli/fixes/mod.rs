@@ -159,9 +159,9 @@ impl Incoming {
         }
     }
 
-    /// Takes in a step, after all that arrived before its end; the latter go to `also` too.
+    /// Takes in a step, after all that arrived until its end; the latter go to `also` too.
     pub fn step(&mut self, step: &Step, also: impl FnMut(&Observation)) {
-        self.hear(step.stance_end, also);
+        self.hear(step.stance_end + 1, also);
         self.smoother.step(step);
         self.said.extend(self.smoother.estimate());
     }

@@ -1,7 +1,7 @@
 //! The steps of a live shoe in a building: followed as they come, and the shoe is told its floor mode.
 
 use crate::cli::fixes::Incoming;
-use crate::cli::located::{Following, InBuilding};
+use crate::cli::located::{Answer, Following, InBuilding};
 use crate::cli::{Error, live::words};
 use crate::follow::{self, Follower, mode_word, scene};
 use crate::link::Connection;
@@ -120,7 +120,11 @@ impl Places {
         self.unusual += u64::from(said.unusual.is_some());
         self.shoe.want(timely(said.mode, age_us));
         let moment = scene::moment(self.following.follower(), &said, object.to_string());
-        Some(Told { text: words::place(&said), object, moment })
+        let mut text = words::place(&said);
+        if let Some(Answer::Positions(estimate)) = self.following.answer(&said) {
+            text += &words::position(&estimate);
+        }
+        Some(Told { text, object, moment })
     }
 
     /// The plan, for viewers.

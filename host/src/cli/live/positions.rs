@@ -1,6 +1,7 @@
 //! Positions of other sources beside the steps of a live shoe.
 
 use super::places::{Places, WAITING};
+use super::words;
 use crate::cli::Error;
 use crate::cli::fixes::{Incoming, Source, Stream};
 use crate::fixes::line::Clock;
@@ -8,6 +9,11 @@ use crate::fixes::{Fix, smoother};
 use crate::link::Connection;
 use serde_json::{Value as Json, json};
 use sohle_shared::step::Step;
+use sohle_shared::time::Micros;
+
+/// A shoe that has walked alone tells all its steps first; so long no position is heard, which would come before them.
+/// **Units:** us.
+const SETTLING_US: i64 = 1_500_000;
 
 /// Hears positions, and puts them together with the steps where no building is.
 pub struct Positions {
@@ -17,6 +23,8 @@ pub struct Positions {
     lines: u64,
     /// In a building, who is followed there hears them.
     alone: Option<Incoming>,
+    /// When the clock of the shoe became known, by that of the laptop.
+    since: Option<Micros>,
     /// Steps that wait for the clock of the shoe to be known, where no building is.
     waiting: Vec<Step>,
 }
@@ -34,7 +42,7 @@ impl Positions {
             None => Some(Incoming::new(None, &settings, quiet)?),
         };
         let name = source.to_string();
-        Ok(Self { stream: source.stream()?, name, lines: 0, alone, waiting: Vec::new() })
+        Ok(Self { stream: source.stream()?, name, lines: 0, alone, since: None, waiting: Vec::new() })
     }
 
     /// Takes in what has come, and returns it. As long as nobody knows what the clock of the shoe says, all waits.
@@ -43,6 +51,7 @@ impl Positions {
         let Some(now) = connection.session().clock().to_shoe(host) else { return Vec::new() };
         let epoch_us = Some(opened_us.saturating_add(host - now));
         let clock = Clock { epoch_us, now: (!self.stream.timed).then_some(now) };
+        let settled = host - *self.since.get_or_insert(host) > SETTLING_US;
         let mut fixes = Vec::new();
         let (stream, lines, name) = (&self.stream, &mut self.lines, &self.name);
         let mut read = |incoming: &mut Incoming| {
@@ -52,7 +61,7 @@ impl Positions {
             }
         };
         // What says itself when it is to be heard is heard with the step that comes next.
-        let until = (!self.stream.timed && self.waiting.is_empty()).then_some(now + 1);
+        let until = (!self.stream.timed && self.waiting.is_empty() && settled).then_some(now + 1);
         if let Some(alone) = &mut self.alone {
             read(alone);
             if let Some(until) = until {
@@ -91,9 +100,7 @@ impl Positions {
     fn follow(&mut self, step: &Step, unix_us: Option<i64>) -> Option<(String, Json)> {
         let alone = self.alone.as_mut()?;
         alone.step(step, |_| ());
-        let estimate = alone.estimate()?;
-        let [x, y] = estimate.place;
-        let text = format!("{:>6} ({x:.2}, {y:.2}) m, sigma {:.2} m\n", "", estimate.sigma_m());
+        let text = words::position(&alone.estimate()?);
         let object = json!({
             "event": "position", "time_us": step.stance_end.0, "unix_us": unix_us, "step": step.index,
             "positions": alone.object(None),

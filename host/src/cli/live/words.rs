@@ -1,5 +1,6 @@
 //! What `sohle live` says of steps, places and recordings.
 
+use crate::fixes::Estimate;
 use crate::follow::{Said, mode_word};
 use crate::link::recorder::Recorded;
 use crate::particle::{Cluster, State};
@@ -65,6 +66,12 @@ pub fn object(boot: u32, id: u32, step: &Step, delay: Option<f64>) -> Json {
         "stance_end_us": step.stance_end.0, "displacement_m": <[f32; 3]>::from(step.displacement),
         "turn_rad": step.turn, "ground": ground(step.mode), "marks": marks(step), "delay_ms": delay,
     })
+}
+
+/// A place of steps and positions alone, for people.
+pub fn position(estimate: &Estimate) -> String {
+    let [x, y] = estimate.place;
+    format!("{:>6} by positions and steps: ({x:.2}, {y:.2}) m, sigma {:.2} m\n", "", estimate.sigma_m())
 }
 
 /// A place for people.

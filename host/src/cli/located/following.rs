@@ -6,7 +6,9 @@ use crate::building::georeference::Projection;
 use crate::cli::fixes::Incoming;
 use crate::cli::{Error, print};
 use crate::export::{file, png};
+use crate::fixes;
 use crate::follow::{self, Follower, LONGEST_STEP_M, Said, Unusual, scene};
+use crate::particle::State;
 use crate::recording::Recording;
 use crate::recording::scene::{Lines, Moment};
 use serde_json::Value;
@@ -16,6 +18,29 @@ use std::path::Path;
 
 /// The estimate after each step, a JSON object to a line.
 const STREAM: &str = "places.jsonl";
+
+/// The plan is not believed against positions that are farther from it than this, and than so many standard deviations of both.
+/// **Units:** m.
+const APART_M: f64 = 5.0;
+const APART_SIGMAS: f64 = 4.0;
+
+/// Whose answer is the best.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// That of steps, plan and positions in the particle filter.
+    Map,
+    /// This one, of steps and positions alone.
+    Positions(fixes::Estimate),
+}
+
+impl Answer {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Map => "map",
+            Self::Positions(_) => "positions",
+        }
+    }
+}
 
 /// A follower and its outputs.
 pub struct Following {
@@ -94,6 +119,7 @@ impl Following {
         object["unix_us"] = unix_us.into();
         if let Some(incoming) = &self.incoming {
             object["positions"] = incoming.object(self.projection.as_ref()).into();
+            object["answer"] = self.answer(&said).map(Answer::word).into();
         }
         let line = object.to_string();
         self.outputs.line(&line);
@@ -105,6 +131,23 @@ impl Following {
             moments.push(scene::moment(&self.follower, &said, line));
         }
         (said, object)
+    }
+
+    /// Whose answer is the best after a step: that of the plan, unless it knows none or one that positions and steps are against.
+    pub fn answer(&self, said: &Said) -> Option<Answer> {
+        let located = said.estimate.state == State::Located;
+        let positions = self.incoming.as_ref().and_then(Incoming::estimate);
+        match (said.estimate.place().filter(|_| located), positions) {
+            (None, None) => None,
+            (Some(_), None) => Some(Answer::Map),
+            (None, Some(positions)) => Some(Answer::Positions(positions)),
+            (Some(map), Some(positions)) => {
+                let [x, y] = positions.place;
+                let apart = (map.position.x - x).hypot(map.position.y - y);
+                let most = APART_M.max(APART_SIGMAS * map.sigma_m().hypot(positions.sigma_m()));
+                Some(if apart > most { Answer::Positions(positions) } else { Answer::Map })
+            }
+        }
     }
 
     /// The walk begins at `start`, now; what was said before is forgotten.

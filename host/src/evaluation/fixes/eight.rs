@@ -1,7 +1,7 @@
 //! The recorded walk along an eight, with positions as 5G would tell them.
 
 use super::figures::{Figures, live};
-use crate::evaluation::phone::path::Path;
+use crate::evaluation::phone::path::{Path, rms};
 use crate::evaluation::phone::suite::START_SIGMA_M;
 use crate::evaluation::phone::walk::{Error, PhoneWalk};
 use crate::fixes::adjustment::Adjustment;
@@ -11,6 +11,7 @@ use crate::fixes::{Documented, Measured, Observation, Outliers, Smoother, smooth
 use crate::follow::sight;
 use crate::particle::{self, ParticleFilter, StartPlace};
 use crate::phone;
+use crate::phone::sample::WayPoint;
 use rayon::prelude::*;
 use sohle_shared::step::Step;
 
@@ -21,6 +22,9 @@ const SIGMA_M: f64 = 1.8;
 const DIRECTION_SIGMA: f64 = 0.1;
 /// Rates of positions, and every which of the recorded two in a second is kept for it. **Units:** Hz.
 const RATES: [(f64, usize); 5] = [(2.0, 1), (1.0, 2), (0.2, 10), (0.1, 20), (1.0 / 30.0, 60)];
+/// People stamp a way-point when they have passed it, or before; so much later. The first is as it was stamped.
+/// **Units:** us.
+const LATE_US: [i64; 10] = [0, -200_000, -100_000, 100_000, 200_000, 300_000, 400_000, 500_000, 600_000, 700_000];
 /// The particle filter is random and slow: so many beginnings of the thinning, with so many seeds each.
 const PARTICLE_PHASES: usize = 3;
 const PARTICLE_SEEDS: u64 = 2;
@@ -40,6 +44,29 @@ pub struct Row {
     pub method: &'static str,
     /// Errors at the way-points, of up to ten beginnings of the thinning together.
     pub figures: Figures,
+    /// How much later than the person was there the way-points would be stamped, if the path were right: what fits best.
+    /// **Units:** s.
+    pub late_s: f64,
+    /// Root mean square error with that taken away. **Units:** m.
+    pub timed_m: f64,
+}
+
+impl Row {
+    fn of(start: &'static str, rate_hz: f64, method: &'static str, mut errors: Vec<Vec<f64>>) -> Self {
+        let timed = errors.iter().enumerate().filter_map(|(index, errors)| Some((index, rms(errors)?)));
+        let (index, timed_m) = timed.min_by(|one, other| one.1.total_cmp(&other.1)).unwrap_or_default();
+        let late_s = LATE_US[index] as f64 * 1e-6;
+        Self { start, rate_hz, method, figures: Figures::of(std::mem::take(&mut errors[0])), late_s, timed_m }
+    }
+}
+
+/// Errors of several paths together, for each of [`LATE_US`].
+fn together(found: Vec<Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
+    let mut all = vec![Vec::new(); LATE_US.len()];
+    for errors in found {
+        all.iter_mut().zip(errors).for_each(|(all, errors)| all.extend(errors));
+    }
+    all
 }
 
 /// What is compared on the walk.
@@ -68,17 +95,17 @@ impl<'a> Comparison<'a> {
     pub fn rows(&self, particle: &particle::Parameters, seed: u64) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
         let alone = self.errors(Path::of(&self.steps).on_first_leg(&self.walk.way_points).map(|(path, _)| path));
-        rows.push(Row { start: "known", rate_hz: 0.0, method: "steps alone", figures: Figures::of(alone) });
+        rows.push(Row::of("known", 0.0, "steps alone", alone));
         for (start, known) in [("known", true), ("unknown", false)] {
             for (rate_hz, every) in RATES.into_iter().filter(|&(rate, _)| known || rate >= LEAST_RATE_HZ) {
                 let mut push = |method, errors| {
-                    rows.push(Row { start, rate_hz, method, figures: Figures::of(errors) });
+                    rows.push(Row::of(start, rate_hz, method, errors));
                 };
-                let of_all = |path: &(dyn Fn(&[Observation]) -> Path + Sync)| -> Vec<f64> {
+                let of_all = |path: &(dyn Fn(&[Observation]) -> Path + Sync)| {
                     let phase = |phase| self.errors(Some(path(&self.thinned(every, phase))));
                     let count = every.min(MOST_PHASES);
                     let phases = (0..count).into_par_iter().map(|number| number * every / count);
-                    phases.map(phase).collect::<Vec<_>>().concat()
+                    together(phases.map(phase).collect())
                 };
                 let documented = Documented::default();
                 let start = self.start(known);
@@ -134,8 +161,13 @@ impl<'a> Comparison<'a> {
         self.observations.iter().skip(phase).step_by(every).cloned().collect()
     }
 
-    fn errors(&self, path: Option<Path>) -> Vec<f64> {
-        path.map_or_else(Vec::new, |path| path.errors(&self.walk.way_points))
+    /// Errors at the way-points, for each of [`LATE_US`].
+    fn errors(&self, path: Option<Path>) -> Vec<Vec<f64>> {
+        let path = path.unwrap_or_default();
+        let earlier = |late_us: i64| -> Vec<_> {
+            self.walk.way_points.iter().map(|point| WayPoint { time: point.time + -late_us, ..*point }).collect()
+        };
+        LATE_US.map(|late_us| path.errors(&earlier(late_us))).to_vec()
     }
 
     /// As it was said, and as it was corrected.
@@ -149,16 +181,21 @@ impl<'a> Comparison<'a> {
     }
 
     /// Steps, positions and the plan in the particle filter: errors as it was said, and as it was corrected.
-    fn on_the_map(&self, every: usize, particle: &particle::Parameters, seed: u64) -> Result<[Vec<f64>; 2], Error> {
+    fn on_the_map(
+        &self,
+        every: usize,
+        particle: &particle::Parameters,
+        seed: u64,
+    ) -> Result<[Vec<Vec<f64>>; 2], Error> {
         let phases = every.min(PARTICLE_PHASES);
         let runs: Vec<_> = (0..phases).flat_map(|phase| (0..PARTICLE_SEEDS).map(move |seed| (phase, seed))).collect();
-        let run = |&(phase, number): &(usize, u64)| -> Result<[Vec<f64>; 2], Error> {
+        let run = |&(phase, number): &(usize, u64)| -> Result<[Vec<Vec<f64>>; 2], Error> {
             let said = self.thinned(every, phase * every / phases);
             let paths = self.followed(&said, particle, seed.wrapping_add(number))?;
             Ok(paths.map(|path| self.errors(Some(path))))
         };
         let found = runs.par_iter().map(run).collect::<Result<Vec<_>, _>>()?;
-        Ok([0, 1].map(|kind| found.iter().flat_map(|errors| errors[kind].clone()).collect()))
+        Ok([0, 1].map(|kind| together(found.iter().map(|errors| errors[kind].clone()).collect())))
     }
 
     fn followed(&self, said: &[Observation], p: &particle::Parameters, seed: u64) -> Result<[Path; 2], Error> {

@@ -17,8 +17,6 @@ use sohle_shared::time::Micros;
 
 /// Nothing is known of a place (standard deviation). **Units:** m.
 const ANYWHERE_M: f64 = 1e3;
-/// A place that is known better than this is one, whatever told of it (root of the sum of the variances). **Units:** m.
-const KNOWN_M: f64 = 5.0;
 /// Nothing is known of a direction (standard deviation). **Units:** rad.
 const ANY_DIRECTION: f64 = 3.0;
 /// A direction known better than this can be linearised (standard deviation). **Units:** rad.
@@ -167,7 +165,6 @@ impl Smoother {
         held.weight = right;
         self.held.push(held);
         self.settle();
-        self.placed |= self.sigma_m().is_some_and(|sigma| sigma < KNOWN_M);
         let weight = self.held.last().map_or(0.0, |held| held.weight);
         self.doubts.push(weight < 0.5);
         if self.doubts.len() > LOOKED_AT {
@@ -290,7 +287,9 @@ impl Smoother {
 
     /// Finds the states that fit best.
     fn settle(&mut self) {
-        if self.directed {
+        if !self.placed {
+            self.find_place();
+        } else if self.directed {
             // The first with what the last is worth by all that was known before it.
             self.newton();
             self.rounds(Belief::Settled, ROUNDS);
@@ -424,11 +423,6 @@ impl Smoother {
         let last = self.states.len().checked_sub(1)?;
         let (covariance, _) = *self.known.covariances(last).first()?;
         Some((self.states[last], covariance))
-    }
-
-    /// How well the last place is known (root of the sum of the variances).
-    fn sigma_m(&self) -> Option<f64> {
-        self.state_of_last().map(|(_, covariance)| (covariance[(0, 0)] + covariance[(1, 1)]).max(0.0).sqrt())
     }
 
     /// What was found out about the steps.

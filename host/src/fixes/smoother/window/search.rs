@@ -3,11 +3,18 @@
 use super::super::held::Belief;
 use super::super::state::{Column, HEADING, place};
 use super::{KNOWN_DIRECTION, LOOKED_AT, ROUNDS_ANEW, Smoother};
+use crate::fixes::Measured;
 use nalgebra::Vector2;
 use std::f64::consts::{PI, TAU};
 
 /// Directions that are tried where it is not known.
 const DIRECTIONS: usize = 6;
+/// Places that are tried on the circle that a range leaves.
+const PLACES: usize = 8;
+/// Ranges that must bear a place out before it is held for known.
+const LEAST_RANGES: usize = 4;
+/// A place that is known better than this is one (root of the sum of the variances). **Units:** m.
+const KNOWN_M: f64 = 5.0;
 /// How much better another path must explain all (logarithm of odds).
 const BETTER: f64 = 6.0;
 /// With so many of the last positions doubted it is asked whether the path is what is wrong.
@@ -16,6 +23,33 @@ const MOST_DOUBTED: usize = 6;
 const LEAST_FIXES: usize = 4;
 
 impl Smoother {
+    /// Tries places around the anchor of the last range, where nothing is known of the place, and keeps the best.
+    pub(super) fn find_place(&mut self) {
+        let Some(last) = self.held.last() else { return };
+        let Measured::Range { anchor, metres, .. } = last.measured else { return };
+        let (before, here) = (self.states.clone(), place(&self.states[last.spot.index]));
+        let mut best: Option<(f64, Vec<Column>)> = None;
+        for number in 0..PLACES {
+            let (sin, cos) = (TAU * number as f64 / PLACES as f64).sin_cos();
+            let shift = Vector2::from(anchor) + Vector2::new(cos, sin) * metres - here;
+            self.states.clone_from(&before);
+            self.states.iter_mut().for_each(|state| *state += Column::from([shift.x, shift.y, 0.0, 0.0, 0.0]));
+            self.rounds(Belief::Patient, ROUNDS_ANEW);
+            self.rounds(Belief::Settled, ROUNDS_ANEW);
+            let cost = self.cost();
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, self.states.clone()));
+            }
+        }
+        let Some((_, states)) = best else { return };
+        self.states = states;
+        self.rounds(Belief::Settled, 1);
+        let Some((_, covariance)) = self.state_of_last() else { return };
+        let sigma_m = (covariance[(0, 0)] + covariance[(1, 1)]).max(0.0).sqrt();
+        let ranges = self.held.iter().filter(|held| held.weight > 0.5).count();
+        self.placed = sigma_m < KNOWN_M && ranges >= LEAST_RANGES;
+    }
+
     /// Tries all directions, where none is known, and keeps the best.
     pub(super) fn find_direction(&mut self) {
         let first = self.states[0][HEADING];
