@@ -122,6 +122,15 @@ pub fn all() -> Result<Vec<PhoneWalk>, Error> {
     SOURCES.iter().map(|source| PhoneWalk::read(&home, source)).collect()
 }
 
+/// The walk along an eight in the university alone.
+///
+/// # Errors
+/// As [`all`].
+pub fn eight() -> Result<PhoneWalk, Error> {
+    let home = recordings_dir().ok_or(Error::NoRecordings)?;
+    PhoneWalk::read(&home, &SOURCES[0])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
