@@ -147,7 +147,7 @@ fn a_recorded_walk_is_matched_from_a_known_start_and_from_anywhere() {
     assert!(refused(home.path(), &wrong).contains("aside_m = -1: expected 0.05 to 20"));
 }
 
-/// In so many walks of each building; all of the suite take a minute.
+/// So many walks in each building; those of the whole suite take some minutes.
 const FEW: &str = "4";
 
 #[test]
