@@ -54,6 +54,7 @@ pub fn draw(wanted: Wanted) -> Result<Picture, Error> {
     let mut app = App::new(Some(Map::new(studio.render())), layout);
     app.layout().look = if sheet.dark { Look::Dark } else { Look::Light };
     views.into_iter().for_each(|view| app.layout().open(view));
+    let fitted = app.layout().map.camera.is_none();
     let begun = Instant::now();
     let mut asked = vec![false; openings.len()];
     let mut openings = openings.into_iter();
@@ -90,6 +91,10 @@ pub fn draw(wanted: Wanted) -> Result<Picture, Error> {
             return Err(Error::Late(PATIENCE.as_secs()));
         }
         std::thread::sleep(PAUSE);
+    }
+    if fitted {
+        // What was fitted when it was opened had the room that there was then.
+        app.layout().map.camera = None;
     }
     Ok(studio.picture(sheet, |ui| app.show(ui))?)
 }
