@@ -3,49 +3,22 @@
 //! The bounds are wide: they keep out what makes no sense, not what merely follows badly.
 
 use super::Parameters;
-
-/// One number among the settings.
-#[derive(Clone, Copy, Debug)]
-pub struct Setting {
-    /// Where it stands, as the keys of a file in TOML; elements of a list count from 0.
-    pub name: &'static str,
-    /// Its unit; `1` for a number without.
-    pub unit: &'static str,
-    /// The least that makes sense. **Units:** [`Setting::unit`].
-    pub least: f32,
-    /// The largest that makes sense. **Units:** [`Setting::unit`].
-    pub largest: f32,
-    value: fn(&Parameters) -> f32,
-    set: fn(&mut Parameters, f32),
-}
-
-impl Setting {
-    /// Its value in `parameters`. **Units:** [`Setting::unit`].
-    pub fn value(&self, parameters: &Parameters) -> f32 {
-        (self.value)(parameters)
-    }
-
-    /// Gives it a value in `parameters`, within its bounds or not; whole numbers are cut. **Units:** [`Setting::unit`].
-    pub fn set(&self, parameters: &mut Parameters, value: f32) {
-        (self.set)(parameters, value);
-    }
-}
+use sohle_shared::tracker::settings::Setting;
 
 macro_rules! setting {
     ($name:literal, $unit:literal, $least:expr, $largest:expr, $($field:tt)+) => {
-        Setting {
-            name: $name,
-            unit: $unit,
-            least: $least,
-            largest: $largest,
-            value: |parameters| parameters.$($field)+ as f32,
-            set: |parameters, value| parameters.$($field)+ = value as _,
-        }
+        Setting::new(
+            $name,
+            $unit,
+            [$least, $largest],
+            |parameters| parameters.$($field)+ as f32,
+            |parameters, value| parameters.$($field)+ = value as _,
+        )
     };
 }
 
 /// All of them.
-pub const SETTINGS: &[Setting] = &[
+pub const SETTINGS: &[Setting<Parameters>] = &[
     setting!("spacing_m", "m", 0.05, 10.0, spacing_m),
     setting!("headings", "1", 1.0, 360.0, headings),
     setting!("room_prior", "1", 0.0, 1.0, room_prior),

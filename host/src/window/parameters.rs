@@ -64,13 +64,7 @@ impl Editor {
         let mut done = self.buttons(ui, &mut parameters, &sets, Page::Tracker);
         done |= self.list(ui, |ui, wanted| {
             let mut done = choices(ui, &mut parameters);
-            egui::Grid::new("tracker settings").num_columns(3).striped(true).show(ui, |ui| {
-                for setting in SETTINGS.iter().filter(|setting| setting.name.contains(wanted)) {
-                    let Setting { name, unit, least, largest, .. } = *setting;
-                    let number = Number { name, unit, least, largest, value: setting.value(&parameters) };
-                    done |= number.show(ui, |value| setting.set(&mut parameters, value));
-                }
-            });
+            done |= numbers(ui, SETTINGS, wanted, &mut parameters);
             done
         });
         if parameters != before {
@@ -105,13 +99,7 @@ impl Editor {
                     done |= ui.selectable_value(method, other, format!("{other:?}")).changed();
                 }
             });
-            egui::Grid::new("particle settings").num_columns(3).striped(true).show(ui, |ui| {
-                for setting in particle::settings::SETTINGS.iter().filter(|setting| setting.name.contains(wanted)) {
-                    let particle::settings::Setting { name, unit, least, largest, .. } = *setting;
-                    let number = Number { name, unit, least, largest, value: setting.value(&parameters) };
-                    done |= number.show(ui, |value| setting.set(&mut parameters, value));
-                }
-            });
+            done |= numbers(ui, particle::settings::SETTINGS, wanted, &mut parameters);
             done
         });
         let changed = parameters != before;
@@ -219,30 +207,31 @@ fn choices(ui: &mut Ui, parameters: &mut tracker::Parameters) -> bool {
     *parameters != before
 }
 
-/// A number that can be changed within its bounds.
-struct Number {
-    name: &'static str,
-    unit: &'static str,
-    least: f32,
-    largest: f32,
-    value: f32,
+/// The settings whose names are wanted, a row each, to be changed within their bounds. Whether what was changed is to be applied.
+fn numbers<P>(ui: &mut Ui, settings: &'static [Setting<P>], wanted: &str, parameters: &mut P) -> bool {
+    let rows = |ui: &mut Ui| {
+        let mut done = false;
+        for setting in settings.iter().filter(|setting| setting.name.contains(wanted)) {
+            done |= number(ui, setting, parameters);
+            ui.end_row();
+        }
+        done
+    };
+    egui::Grid::new("settings").num_columns(3).striped(true).show(ui, rows).inner
 }
 
-impl Number {
-    /// One row. Whether what was changed is to be applied.
-    fn show(self, ui: &mut Ui, set: impl FnOnce(f32)) -> bool {
-        let Self { name, unit, least, largest, mut value } = self;
-        let label = ui.label(name);
-        let size = value.abs().max(least.abs()).max(1e-6);
-        let drag = DragValue::new(&mut value).range(least..=largest).speed(size * 0.01).max_decimals(9);
-        let response = ui.add(drag).labelled_by(label.id);
-        let unit = if unit == "1" { "" } else { unit };
-        ui.label(RichText::new(unit).weak());
-        let response = response.on_hover_text(format!("{least} to {largest} {unit}"));
-        if response.changed() {
-            set(value);
-        }
-        ui.end_row();
-        response.drag_stopped() || response.lost_focus()
+/// One setting. Whether it is to be applied.
+fn number<P>(ui: &mut Ui, setting: &Setting<P>, parameters: &mut P) -> bool {
+    let mut value = setting.value(parameters);
+    let label = ui.label(setting.name);
+    let size = value.abs().max(setting.least.abs()).max(1e-6);
+    let drag = DragValue::new(&mut value).range(setting.least..=setting.largest).speed(size * 0.01).max_decimals(9);
+    let response = ui.add(drag).labelled_by(label.id);
+    let unit = if setting.unit == "1" { "" } else { setting.unit };
+    ui.label(RichText::new(unit).weak());
+    let response = response.on_hover_text(format!("{} to {} {unit}", setting.least, setting.largest));
+    if response.changed() {
+        setting.set(parameters, value);
     }
+    response.drag_stopped() || response.lost_focus()
 }

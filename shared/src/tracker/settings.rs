@@ -7,9 +7,9 @@
 use super::Parameters;
 use core::fmt;
 
-/// One number among the settings.
+/// One number among the settings `P`.
 #[derive(Clone, Copy, Debug)]
-pub struct Setting {
+pub struct Setting<P: 'static = Parameters> {
     /// Where it stands, as the keys of a file in TOML; elements of a list count from 0.
     pub name: &'static str,
     /// Its unit; `1` for a number without.
@@ -18,21 +18,34 @@ pub struct Setting {
     pub least: f32,
     /// The largest that makes sense. **Units:** [`Setting::unit`].
     pub largest: f32,
-    value: fn(&Parameters) -> f32,
-    set: fn(&mut Parameters, f32),
+    value: fn(&P) -> f32,
+    set: fn(&mut P, f32),
 }
 
-impl Setting {
+impl<P> Setting<P> {
+    /// A number of this name and unit, with the least and the largest that make sense, and how it is read and set.
+    pub const fn new(
+        name: &'static str,
+        unit: &'static str,
+        [least, largest]: [f32; 2],
+        value: fn(&P) -> f32,
+        set: fn(&mut P, f32),
+    ) -> Self {
+        Self { name, unit, least, largest, value, set }
+    }
+
     /// Its value in `parameters`. **Units:** [`Setting::unit`].
-    pub fn value(&self, parameters: &Parameters) -> f32 {
+    pub fn value(&self, parameters: &P) -> f32 {
         (self.value)(parameters)
     }
 
     /// Gives it a value in `parameters`, within its bounds or not; whole numbers are cut. **Units:** [`Setting::unit`].
-    pub fn set(&self, parameters: &mut Parameters, value: f32) {
+    pub fn set(&self, parameters: &mut P, value: f32) {
         (self.set)(parameters, value);
     }
+}
 
+impl Setting {
     fn named(name: &str) -> Option<&'static Self> {
         SETTINGS.iter().find(|setting| setting.name == name)
     }
@@ -109,14 +122,13 @@ const ORDERED: &[(&str, &str)] = &[
 /// A table of settings, a line each: keys, unit, least, largest.
 macro_rules! settings {
     ($($first:ident $(.$key:ident)* $([$at:literal])?: $unit:literal, $least:literal, $largest:literal;)+) => {
-        &[$(Setting {
-            name: concat!(stringify!($first) $(, ".", stringify!($key))* $(, "[", $at, "]")?),
-            unit: $unit,
-            least: $least,
-            largest: $largest,
-            value: |parameters| parameters.$first$(.$key)*$([$at])?.into(),
-            set: |parameters, value| parameters.$first$(.$key)*$([$at])? = value as _,
-        }),+]
+        &[$(Setting::new(
+            concat!(stringify!($first) $(, ".", stringify!($key))* $(, "[", $at, "]")?),
+            $unit,
+            [$least, $largest],
+            |parameters| parameters.$first$(.$key)*$([$at])?.into(),
+            |parameters, value| parameters.$first$(.$key)*$([$at])? = value as _,
+        )),+]
     };
 }
 
