@@ -27,22 +27,12 @@ impl Smoother {
     pub(super) fn find_place(&mut self) {
         let Some(last) = self.held.last() else { return };
         let Measured::Range { anchor, metres, .. } = last.measured else { return };
-        let (before, here) = (self.states.clone(), place(&self.states[last.spot.index]));
-        let mut best: Option<(f64, Vec<Column>)> = None;
-        for number in 0..PLACES {
-            let (sin, cos) = (TAU * number as f64 / PLACES as f64).sin_cos();
+        let here = place(&self.states[last.spot.index]);
+        self.try_around(PLACES, |window, angle| {
+            let (sin, cos) = angle.sin_cos();
             let shift = Vector2::from(anchor) + Vector2::new(cos, sin) * metres - here;
-            self.states.clone_from(&before);
-            self.states.iter_mut().for_each(|state| *state += Column::from([shift.x, shift.y, 0.0, 0.0, 0.0]));
-            self.rounds(Belief::Patient, ROUNDS_ANEW);
-            self.rounds(Belief::Settled, ROUNDS_ANEW);
-            let cost = self.cost();
-            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, self.states.clone()));
-            }
-        }
-        let Some((_, states)) = best else { return };
-        self.states = states;
+            window.states.iter_mut().for_each(|state| *state += Column::from([shift.x, shift.y, 0.0, 0.0, 0.0]));
+        });
         self.rounds(Belief::Settled, 1);
         let Some((_, covariance)) = self.state_of_last() else { return };
         let sigma_m = (covariance[(0, 0)] + covariance[(1, 1)]).max(0.0).sqrt();
@@ -50,14 +40,13 @@ impl Smoother {
         self.placed = sigma_m < KNOWN_M && ranges >= LEAST_RANGES;
     }
 
-    /// Tries all directions, where none is known, and keeps the best.
-    pub(super) fn find_direction(&mut self) {
-        let first = self.states[0][HEADING];
+    /// Changes the states for each of so many angles all around, lets them settle, and keeps the best.
+    fn try_around(&mut self, count: usize, change: impl Fn(&mut Self, f64)) {
         let mut best: Option<(f64, Vec<Column>)> = None;
         let before = self.states.clone();
-        for direction in 0..DIRECTIONS {
+        for number in 0..count {
             self.states.clone_from(&before);
-            self.turn(TAU * direction as f64 / DIRECTIONS as f64);
+            change(self, TAU * number as f64 / count as f64);
             self.rounds(Belief::Patient, ROUNDS_ANEW);
             self.rounds(Belief::Settled, ROUNDS_ANEW);
             let cost = self.cost();
@@ -65,8 +54,15 @@ impl Smoother {
                 best = Some((cost, self.states.clone()));
             }
         }
-        let Some((_, states)) = best else { return };
-        self.states = states;
+        if let Some((_, states)) = best {
+            self.states = states;
+        }
+    }
+
+    /// Tries all directions, where none is known, and keeps the best.
+    pub(super) fn find_direction(&mut self) {
+        let first = self.states[0][HEADING];
+        self.try_around(DIRECTIONS, Self::turn);
         // Headings are counted on without a jump; the first decides by how many turns they differ.
         let whole = ((self.states[0][HEADING] - first + PI) / TAU).floor() * TAU;
         self.states.iter_mut().for_each(|state| state[HEADING] -= whole);
