@@ -15,6 +15,7 @@ use crate::window::gpu::offscreen::{Sheet, Studio};
 use crate::window::layout::{View, usual_file};
 use crate::window::map::measure::measure as map_frames;
 use crate::window::run::First;
+use crate::window::shoes::PATIENCE;
 use crate::window::{measure, picture, run, saving};
 use crate::{calibration, particle, phone, toml_file};
 use std::path::PathBuf;
@@ -199,9 +200,6 @@ fn measured() -> Result<(), Error> {
     bar.finish_and_clear();
     print(&table.text())
 }
-
-/// A shoe that has gone is not waited for longer than its own answers take.
-const PATIENCE: Duration = Duration::from_secs(25);
 
 fn opening(args: &Args, what: &str) -> Result<Opening, Error> {
     let path = PathBuf::from(what);

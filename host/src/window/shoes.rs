@@ -23,7 +23,7 @@ const COLOURS: [Rgb; 7] = [
 ];
 
 /// A shoe that has gone is not waited for longer than its own answers take.
-const PATIENCE: Duration = Duration::from_secs(25);
+pub const PATIENCE: Duration = Duration::from_secs(25);
 
 /// One of them.
 struct Shoe {
@@ -74,7 +74,9 @@ impl Shoes {
         if index < self.open.len() {
             self.leaving.retain(|thread| !thread.is_finished());
             self.leaving.push(self.open.remove(index).engine.leave());
-            self.selected = self.selected.min(self.open.len().saturating_sub(1));
+            // Who was selected stays so, and moves up if one above is gone.
+            let selected = if index < self.selected { self.selected - 1 } else { self.selected };
+            self.select(selected);
         }
     }
 

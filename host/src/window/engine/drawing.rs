@@ -2,7 +2,9 @@
 
 use super::on_graph::OnGraph;
 use super::walk::{Anchor, Moment};
+use crate::building::Building;
 use crate::follow::{Follower, runs};
+use crate::graph;
 use crate::particle::{Particle, State};
 use crate::recording::Recording;
 use crate::track::Track as Steps;
@@ -34,10 +36,16 @@ impl Drawing {
         Self { truth, ..Self::default() }
     }
 
-    /// Follows on a walk graph too, or no longer. `measured`: lengths of steps are measured, not guessed.
-    pub fn follow_on(&mut self, on_graph: Option<OnGraph>, measured: bool) {
+    /// Follows on the walk graph of a building too; without one, no longer. `measured`: lengths of steps are measured, not
+    /// guessed.
+    ///
+    /// # Errors
+    /// As [`OnGraph::of`]. Nothing changes then.
+    pub fn follow_on(&mut self, building: Option<&Building>, measured: bool) -> Result<(), graph::Error> {
+        let on_graph = building.map(OnGraph::of).transpose()?;
         self.on_graph = on_graph.map(|on_graph| (on_graph, measured));
         self.stepped = None;
+        Ok(())
     }
 
     /// What was decided at the last step on the walk graph, if one is followed on.

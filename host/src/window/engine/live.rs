@@ -1,7 +1,6 @@
 //! A shoe that is listened to, for the window: the same as `sohle live` does, without a word on the terminal.
 
 use super::drawing::Drawing;
-use super::on_graph::OnGraph;
 use super::replay::{warnings, whereabouts};
 use super::signals::{History, Row, Signal};
 use super::snapshot::{Kind, Link, Pace, Snapshot, Warning};
@@ -195,11 +194,9 @@ impl Source for Live {
             Command::Start(start) => self.begin(&start),
             Command::Record(path) => self.record(path),
             Command::OnGraph(on) => {
-                let building = self.follower().map(|follower| follower.building().clone());
-                match building.filter(|_| on).map(|building| OnGraph::of(&building)).transpose() {
-                    Ok(on_graph) => self.drawing.follow_on(on_graph, true),
-                    Err(error) => self.fault = Some(error.to_string()),
-                }
+                let building = self.follower().filter(|_| on).map(|follower| follower.building().clone());
+                let followed = self.drawing.follow_on(building.as_deref(), true);
+                self.fault = followed.err().map(|error| error.to_string());
             }
             Command::Export(path) => {
                 let told = super::export::track(&path, &self.heard.track, self.follower());

@@ -1,7 +1,6 @@
 //! A recorded walk that is played: at any speed, forwards and backwards, step by step.
 
 use super::drawing::Drawing;
-use super::on_graph::OnGraph;
 use super::snapshot::{Kind, Pace, Snapshot, Warning, Whereabouts};
 use super::walk::{Act, Moment, Settings, Walk};
 use super::{Command, Source, Work};
@@ -73,13 +72,10 @@ impl Replay {
     }
 
     fn follow_on(&mut self, on: bool) {
-        let on_graph = self.walk.building().filter(|_| on).map(OnGraph::of).transpose();
         // Those of a phone are guessed: it has no samples of a foot.
         let measured = !self.walk.recording().samples.is_empty();
-        match on_graph {
-            Ok(on_graph) => self.drawing.follow_on(on_graph, measured),
-            Err(error) => self.fault = Some(error.to_string()),
-        }
+        let followed = self.drawing.follow_on(self.walk.building().filter(|_| on), measured);
+        self.fault = followed.err().map(|error| error.to_string());
     }
 
     fn play(&mut self, playing: bool) {
