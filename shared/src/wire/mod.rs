@@ -8,6 +8,7 @@
 //! Both ends compile this module, so there is no second definition of anything; [`SCHEMA`] tells two ends apart that were
 //! compiled from different ones.
 
+pub mod bluetooth;
 mod difference;
 pub mod frame;
 #[cfg(test)]
