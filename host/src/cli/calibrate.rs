@@ -40,7 +40,7 @@ sohle simulate --preset calibration --seed 3 --out rests.mcap; sohle calibrate r
 )]
 pub struct Args {
     /// The recording of the rests, or the shoe: a serial port or a network port
-    #[arg(value_name = "FILE|serial:PATH[@BAUD]|tcp:HOST:PORT")]
+    #[arg(value_name = "FILE|serial:PATH[@BAUD]|tcp:HOST:PORT|ble:SHOE")]
     source: Source,
     /// How the file is laid out; recognised from the content when left out
     #[arg(long, value_name = "NAME|FILE.toml", long_help = convert::long_help())]
@@ -70,11 +70,7 @@ impl std::str::FromStr for Source {
     type Err = AddressError;
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
-        if text.starts_with("serial:") || text.starts_with("tcp:") {
-            text.parse().map(Self::Shoe)
-        } else {
-            Ok(Self::File(text.into()))
-        }
+        if Address::is_meant(text) { text.parse().map(Self::Shoe) } else { Ok(Self::File(text.into())) }
     }
 }
 

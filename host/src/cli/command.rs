@@ -22,7 +22,7 @@ Examples:\n  sohle command serial:/dev/ttyACM0 reset\n  sohle command tcp:127.0.
 sohle command serial:/dev/ttyACM0 calibration set calibration.toml")]
 pub struct Args {
     /// Where the shoe is: a serial port, at 921600 baud unless it says otherwise, or a network port
-    #[arg(value_name = "serial:PATH[@BAUD]|tcp:HOST:PORT")]
+    #[arg(value_name = "serial:PATH[@BAUD]|tcp:HOST:PORT|ble:SHOE")]
     address: Address,
     #[command(subcommand)]
     what: What,

@@ -21,6 +21,7 @@ pub mod live;
 pub mod located;
 pub mod parameters;
 mod phone;
+pub mod ports;
 pub mod replay;
 pub mod report;
 pub mod route;
@@ -67,6 +68,7 @@ enum Command {
     Bench(bench::Args),
     Line(line::Args),
     Live(live::Args),
+    Ports(ports::Args),
     Window(Box<window::Args>),
     #[command(name = "command")]
     Ask(command::Args),
@@ -113,6 +115,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Bench(args) => bench::run(args),
         Command::Line(args) => line::run(args),
         Command::Live(args) => live::run(args),
+        Command::Ports(args) => ports::run(args),
         Command::Window(args) => window::run(*args),
         Command::Ask(args) => command::run(args),
         Command::Parameters(args) => parameters::run(args),

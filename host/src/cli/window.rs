@@ -205,7 +205,7 @@ fn opening(args: &Args, what: &str) -> Result<Opening, Error> {
     let path = PathBuf::from(what);
     let what = match what.parse::<Address>() {
         Ok(address) => What::Shoe(address),
-        Err(error) if (what.starts_with("serial:") || what.starts_with("tcp:")) && !path.exists() => {
+        Err(error) if Address::is_meant(what) && !path.exists() => {
             return Err(Error::from(error));
         }
         Err(_) => What::Recording(path),

@@ -1,5 +1,6 @@
-//! Where the shoe is: the text `serial:PATH[@BAUD]` or `tcp:HOST:PORT`.
+//! Where the shoe is: the text `serial:PATH[@BAUD]`, `tcp:HOST:PORT` or `ble:NAME|ADDRESS|any`.
 
+use super::bluetooth::wanted::Wanted;
 use std::fmt;
 use std::str::FromStr;
 
@@ -23,11 +24,23 @@ pub enum Address {
         /// Number of the port.
         port: u16,
     },
+    /// A shoe on Bluetooth.
+    Bluetooth(Wanted),
+}
+
+/// What addresses begin with.
+const KINDS: [&str; 3] = ["serial:", "tcp:", "ble:"];
+
+impl Address {
+    /// Whether the text is meant as an address, be it a right one or not.
+    pub fn is_meant(text: &str) -> bool {
+        KINDS.iter().any(|kind| text.starts_with(kind))
+    }
 }
 
 /// A text that is no address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{text}': {fault}; expected serial:/dev/ttyACM0[@{DEFAULT_BAUD}] or tcp:HOST:PORT")]
+#[error("'{text}': {fault}; expected serial:/dev/ttyACM0[@{DEFAULT_BAUD}], tcp:HOST:PORT or ble:NAME|ADDRESS|any")]
 pub struct AddressError {
     text: String,
     fault: &'static str,
@@ -67,7 +80,10 @@ fn parse(text: &str) -> Result<Address, &'static str> {
             }
             Ok(Address::Tcp { host: host.to_owned(), port })
         }
-        _ => Err("neither 'serial:' nor 'tcp:'"),
+        Some(("ble", place)) => {
+            Wanted::parse(place).map(Address::Bluetooth).ok_or("no shoe is named; 'sohle ports' lists those in range")
+        }
+        _ => Err("neither 'serial:' nor 'tcp:' nor 'ble:'"),
     }
 }
 
@@ -77,6 +93,7 @@ impl fmt::Display for Address {
             Self::Serial { path, baud } => write!(out, "serial:{path}@{baud}"),
             Self::Tcp { host, port } if host.contains(':') => write!(out, "tcp:[{host}]:{port}"),
             Self::Tcp { host, port } => write!(out, "tcp:{host}:{port}"),
+            Self::Bluetooth(wanted) => write!(out, "ble:{wanted}"),
         }
     }
 }
@@ -87,7 +104,10 @@ mod tests {
 
     #[test]
     fn what_is_shown_is_read_back() {
-        for text in ["serial:/dev/ttyACM0@921600", "serial:COM3@115200", "tcp:localhost:4000", "tcp:[::1]:4000"] {
+        for text in ["serial:/dev/ttyACM0@921600", "serial:COM3@115200", "tcp:localhost:4000", "tcp:[::1]:4000"]
+            .into_iter()
+            .chain(["ble:any", "ble:Sohle-1A2B", "ble:C0:5E:00:00:00:0A"])
+        {
             assert_eq!(text.parse::<Address>().unwrap().to_string(), text);
         }
     }
@@ -101,8 +121,9 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told_with_what_was_expected() {
         for (text, fault) in [
-            ("/dev/ttyACM0", "neither 'serial:' nor 'tcp:'"),
-            ("udp:host:1", "neither 'serial:' nor 'tcp:'"),
+            ("/dev/ttyACM0", "neither 'serial:' nor 'tcp:' nor 'ble:'"),
+            ("udp:host:1", "neither 'serial:' nor 'tcp:' nor 'ble:'"),
+            ("ble:", "no shoe is named; 'sohle ports' lists those in range"),
             ("serial:", "no serial port is named"),
             ("serial:@9600", "no serial port is named"),
             ("serial:/dev/ttyACM0@fast", "the baud rate behind '@' is no whole number above 0"),
@@ -114,7 +135,12 @@ mod tests {
             ("tcp:::1:4000", "an IPv6 host stands in brackets"),
         ] {
             let told = text.parse::<Address>().unwrap_err().to_string();
-            assert_eq!(told, format!("'{text}': {fault}; expected serial:/dev/ttyACM0[@921600] or tcp:HOST:PORT"));
+            assert_eq!(
+                told,
+                format!(
+                    "'{text}': {fault}; expected serial:/dev/ttyACM0[@921600], tcp:HOST:PORT or ble:NAME|ADDRESS|any"
+                )
+            );
         }
     }
 }

@@ -4,10 +4,11 @@
 //! the laptop's. Neither opens a port nor reads a clock: bytes and time are arguments, so that [`endurance`] can let hours
 //! pass in seconds over a [`line`](mod@line) as bad as it likes. The shoe's end is [`sohle_shared::wire::link`].
 //!
-//! [`transport`] keeps the port at an [`address`] open, [`connection`] puts session and port together, and [`recorder`]
+//! [`transport`] keeps the port at an [`address`] open, be it a cable, the network or [`bluetooth`]; [`connection`] puts session and port together, and [`recorder`]
 //! writes what is heard.
 
 pub mod address;
+pub mod bluetooth;
 pub mod clock;
 pub mod connection;
 mod copies;

@@ -1,10 +1,11 @@
-//! The bytes of a serial port or a network port, opened anew whenever they stop.
+//! The bytes of a serial port, a network port or a shoe on Bluetooth, opened anew whenever they stop.
 //!
 //! A thread opens the port, stamps and hands over what it reads, and when the port is gone tries again, at first soon and
 //! then every [`LONGEST_PAUSE`]. The end that writes is handed over with [`Signal::Opened`]; dropping it makes the thread
 //! open the port anew.
 
 use super::address::Address;
+use super::bluetooth;
 use sohle_shared::time::Micros;
 use std::collections::BTreeSet;
 use std::io::{self, ErrorKind, Read, Write};
@@ -141,6 +142,10 @@ fn open(address: &Address) -> io::Result<Port> {
                 }
             }
             Err(refusal)
+        }
+        Address::Bluetooth(wanted) => {
+            let (reader, writer) = bluetooth::open(wanted)?;
+            Ok(Port { reader: Box::new(reader), writer: Box::new(writer) })
         }
     }
 }

@@ -90,7 +90,7 @@ impl Dialog {
         }
         let ports = serialport::available_ports().unwrap_or_default();
         self.ports = ports.into_iter().map(|port| format!("serial:{}", port.port_name)).collect();
-        self.ports.push("tcp:127.0.0.1:7700".into());
+        self.ports.extend(["ble:any", "tcp:127.0.0.1:7700"].map(String::from));
     }
 
     /// Sets what is asked for first.
@@ -188,7 +188,7 @@ impl Dialog {
     }
 
     fn shoes(&mut self, ui: &mut Ui) {
-        field(ui, "Address", &mut self.wanted.what, "serial:/dev/ttyACM0 or tcp:HOST:PORT");
+        field(ui, "Address", &mut self.wanted.what, "serial:/dev/ttyACM0, tcp:HOST:PORT or ble:any");
         for port in &self.ports {
             if ui.selectable_label(self.wanted.what == *port, port).clicked() {
                 self.wanted.what.clone_from(port);

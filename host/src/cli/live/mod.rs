@@ -36,8 +36,9 @@ Examples:\n  sohle live serial:/dev/ttyACM0\n  sohle live tcp:127.0.0.1:7700 --r
 sohle live serial:/dev/ttyACM0 --building buildings/twin.geojson --start entrances --serve 8765"
 )]
 pub struct Args {
-    /// Where the shoe is: a serial port, at 921600 baud unless it says otherwise, or a network port
-    #[arg(value_name = "serial:PATH[@BAUD]|tcp:HOST:PORT")]
+    /// Where the shoe is: a serial port, at 921600 baud unless it says otherwise, a network port, or a shoe on Bluetooth by name,
+    /// address or 'any'
+    #[arg(value_name = "serial:PATH[@BAUD]|tcp:HOST:PORT|ble:SHOE")]
     address: Address,
     /// The recording [default: sohle-live-TIME.mcap]
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "no_record")]
