@@ -11,6 +11,7 @@ use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::frame::FRAME_MAX;
 use sohle_shared::wire::link::{Identity, Link};
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::port::Port;
 use sohle_shared::wire::packed::PackedStep;
 use std::collections::VecDeque;
 
@@ -123,7 +124,7 @@ impl Stage {
     fn turn(&mut self) {
         let now = self.now;
         let mut buffer = [0; FRAME_MAX];
-        if let Some(frame) = self.link.transmit(now, &mut buffer).map(<[u8]>::to_vec) {
+        if let Some(frame) = self.link.transmit(Port::Serial, now, &mut buffer).map(<[u8]>::to_vec) {
             self.send(frame, false);
         }
         let mut said = Vec::new();
@@ -136,7 +137,7 @@ impl Stage {
             self.session.receive(&bytes, self.now);
         }
         if let Some(bytes) = arrival(&mut self.to_shoe) {
-            self.link.receive(&bytes, self.now);
+            self.link.receive(Port::Serial, &bytes, self.now);
         }
         while let Some(event) = self.session.event() {
             match event {
@@ -192,13 +193,13 @@ pub fn run(data: &[u8]) {
         stage.turn();
     }
     for _ in 0..TURNS_CLEAN {
-        if stage.link.connected() && stage.link.waiting() == 0 {
+        if stage.link.connected(Port::Serial) && stage.link.waiting(Port::Serial) == 0 {
             break;
         }
         stage.turn();
     }
-    assert_eq!((stage.link.waiting(), stage.next.unwrap_or(0)), (0, stage.made), "all have come on a clean line");
-    assert!(stage.dropped <= stage.link.counters().steps_dropped, "only what the shoe had no room for is missing");
+    assert_eq!((stage.link.waiting(Port::Serial), stage.next.unwrap_or(0)), (0, stage.made), "all have come on a clean line");
+    assert!(stage.dropped <= stage.link.counters(Port::Serial).steps_dropped, "only what the shoe had no room for is missing");
 }
 
 /// A good line, one of each fault, and more steps than there is room for.

@@ -16,6 +16,7 @@ use sohle_shared::wire::frame::FRAME_MAX;
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Action, Command, FromShoe, LaptopHello, Level, Refusal, ToShoe, text};
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::port::Port;
 use sohle_shared::wire::transfer::{Item, Value};
 use sohle_shared::wire::{PROTOCOL, SCHEMA};
 
@@ -82,7 +83,7 @@ impl Stage {
     }
 
     fn hear(&mut self, bytes: &[u8]) {
-        self.shoe.received(bytes, self.now);
+        self.shoe.received(Port::Serial, bytes, self.now);
     }
 
     fn hello(&mut self, session: u32) {
@@ -112,7 +113,7 @@ impl Stage {
         let mut said = Vec::new();
         for _ in 0..most {
             let mut buffer = [0; FRAME_MAX];
-            let Some(frame) = self.shoe.transmit(self.now, &mut buffer) else { return said };
+            let Some(frame) = self.shoe.transmit(Port::Serial, self.now, &mut buffer) else { return said };
             said.extend(messages(frame));
         }
         said
@@ -149,7 +150,7 @@ impl Stage {
             Happening::Transmit(frames) => self.transmit(usize::from(frames)).iter().for_each(check),
         }
         assert!(self.shoe.tracker().parameters().check().is_ok(), "settings in effect make sense");
-        self.shoe.deadline(self.now);
+        self.shoe.deadline(Port::Serial, self.now);
         self.shoe.drowsy();
     }
 }

@@ -10,6 +10,7 @@ use sohle_shared::wire::frame::{AnyDecoder, FRAME_MAX};
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::FromShoe;
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::port::Port;
 use sohle_shared::wire::packed::PackedStep;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
@@ -48,7 +49,7 @@ fn walk(listener: &TcpListener) {
         }
         match line.read(&mut bytes) {
             Ok(0) => return,
-            Ok(count) => shoe.received(&bytes[..count], now),
+            Ok(count) => shoe.received(Port::Serial, &bytes[..count], now),
             Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(Duration::from_micros(500)),
             Err(_) => return,
         }
@@ -62,7 +63,7 @@ fn walk(listener: &TcpListener) {
 fn speak<const STEPS: usize>(shoe: &mut Shoe<STEPS>, line: &mut TcpStream, now: Micros) -> bool {
     let mut buffer = [0; FRAME_MAX];
     let mut raw = false;
-    while let Some(mut frame) = shoe.transmit(now, &mut buffer) {
+    while let Some(mut frame) = shoe.transmit(Port::Serial, now, &mut buffer) {
         raw |= matches!(AnyDecoder::new().next(&mut { frame }), Some(Ok(FromShoe::Raw(_))));
         while !frame.is_empty() {
             match line.write(frame) {
@@ -99,7 +100,7 @@ fn stand_since(listener: &TcpListener, walked: impl Iterator<Item = Batch>, from
             let now = Micros(from_us + begun.elapsed().as_micros() as i64);
             match line.read(&mut bytes) {
                 Ok(0) => break,
-                Ok(count) => shoe.received(&bytes[..count], now),
+                Ok(count) => shoe.received(Port::Serial, &bytes[..count], now),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(Duration::from_millis(1)),
                 Err(_) => break,
             }

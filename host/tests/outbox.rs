@@ -8,6 +8,7 @@ use sohle_shared::sample::ImuSample;
 use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::packed::PackedStep;
+use sohle_shared::wire::port::Port;
 use std::path::Path;
 
 /// As on the boards.
@@ -25,7 +26,7 @@ fn kept(name: &str, samples: impl IntoIterator<Item = ImuSample>) -> Option<usiz
     let mut outbox = Outbox::<STEPS>::new(0, Pace::default());
     for step in steps.iter().cycle() {
         outbox.push(PackedStep::pack(step));
-        if outbox.dropped() > 0 {
+        if outbox.dropped(Port::Serial) > 0 {
             break;
         }
     }

@@ -14,6 +14,7 @@ use sohle_shared::wire::frame::{AnyDecoder, FRAME_MAX, encode};
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Ack, Action, Command, FromShoe, LaptopHello, Status, ToShoe, text};
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::port::Port;
 use sohle_shared::wire::{PROTOCOL, SCHEMA};
 use std::cell::RefCell;
 
@@ -97,7 +98,7 @@ fn run(walk: &Walk, sleep_after_s: f32, says: impl Fn(i64) -> Option<Action>) ->
     let mut shoe = Shoe::new(identity, &Config::default(), &parameters, &Calibration::default(), outbox);
     let hello = LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session: 1, software: text("test") };
     let hear = |shoe: &mut Shoe<256>, message, now| {
-        shoe.received(encode(&message, &mut [0; FRAME_MAX]).expect("every message fits into a frame"), now);
+        shoe.received(Port::Serial, encode(&message, &mut [0; FRAME_MAX]).expect("every message fits into a frame"), now);
     };
     hear(&mut shoe, ToShoe::Hello(hello), Micros(0));
 
@@ -145,7 +146,7 @@ fn run(walk: &Walk, sleep_after_s: f32, says: impl Fn(i64) -> Option<Action>) ->
             }
         }
         let mut buffer = [0; FRAME_MAX];
-        while let Some(mut frame) = shoe.transmit(now, &mut buffer) {
+        while let Some(mut frame) = shoe.transmit(Port::Serial, now, &mut buffer) {
             match AnyDecoder::new().next(&mut frame) {
                 Some(Ok(FromShoe::Step(sent))) => {
                     seen.steps.push(sent.step.unpack());

@@ -48,6 +48,7 @@ fn reason(refusal: &Refusal) -> &'static str {
         Refusal::TooLong => "the value is too long",
         Refusal::Checksum => "the value was damaged on the way",
         Refusal::Value => "the numbers make no sense",
+        Refusal::Port => "only over its serial line",
     }
 }
 

@@ -15,6 +15,7 @@ use sohle_shared::wire::frame::FRAME_MAX;
 use sohle_shared::wire::link::{Identity, Link};
 use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::packed::PackedStep;
+use sohle_shared::wire::port::Port;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -166,7 +167,7 @@ impl Shoe {
 
     /// When the link is to be asked again, by the laptop's clock.
     fn deadline(&self, now: Micros) -> Option<Micros> {
-        let due = self.link.deadline(self.time(now));
+        let due = self.link.deadline(Port::Serial, self.time(now));
         (due < Micros(i64::MAX)).then(|| now + ((due - self.time(now)) as f64 / (1.0 + DRIFT)).ceil() as i64)
     }
 }
@@ -206,7 +207,7 @@ pub fn run(kind: Kind, steps: u32, seed: u64) -> Tally {
     let mut end = Micros(i64::MAX);
     while run.now < end {
         let now = run.now;
-        let ripe = kind == Kind::Reboot || run.shoe.link.waiting() < HALF_FETCHED;
+        let ripe = kind == Kind::Reboot || run.shoe.link.waiting(Port::Serial) < HALF_FETCHED;
         if ripe && fate.is_some_and(|fate| fate <= now) {
             fate = None;
             if kind == Kind::Restart {
@@ -264,9 +265,9 @@ impl Run {
             return;
         }
         let time = self.shoe.time(self.now);
-        self.shoe.link.receive(&bytes, time);
+        self.shoe.link.receive(Port::Serial, &bytes, time);
         let mut buffer = [0; FRAME_MAX];
-        while let Some(frame) = self.shoe.link.transmit(time, &mut buffer) {
+        while let Some(frame) = self.shoe.link.transmit(Port::Serial, time, &mut buffer) {
             self.tally.bytes += frame.len() as u64;
             self.from_shoe.write(frame, self.now);
         }
@@ -313,7 +314,7 @@ impl Run {
     /// The numbers of the steps that the shoe keeps.
     fn kept(&self) -> Range<usize> {
         let made = self.made.get(&self.shoe.boot).map_or(0, Vec::len);
-        made - self.shoe.link.waiting()..made
+        made - self.shoe.link.waiting(Port::Serial)..made
     }
 
     fn restart_program(&mut self) {

@@ -382,6 +382,7 @@ mod tests {
     use sohle_shared::wire::link::{Identity, Link, Request, ToShoeDecoder};
     use sohle_shared::wire::message::{Ack, Outcome, Status, TimeReply};
     use sohle_shared::wire::outbox::{Outbox, Pace};
+    use sohle_shared::wire::port::Port;
 
     const SESSION: u32 = 77;
 
@@ -653,12 +654,12 @@ mod tests {
         let numbers: Vec<_> = orders.iter().map(|&order| session.command(Action::Order(order))).collect();
         let (mut done, mut replied) = (Vec::new(), Vec::new());
         for now in (0..60_000_000).step_by(1_000).map(Micros) {
-            link.receive(&to_shoe.read(now), now);
-            if let Some(Request::Order(order)) = link.request() {
+            link.receive(Port::Serial, &to_shoe.read(now), now);
+            if let Some((_, Request::Order(order))) = link.request() {
                 done.push(order);
                 link.answer(Ok(()));
             }
-            if let Some(frame) = link.transmit(now, &mut [0; FRAME_MAX]) {
+            if let Some(frame) = link.transmit(Port::Serial, now, &mut [0; FRAME_MAX]) {
                 from_shoe.write(frame, now);
             }
             session.receive(&from_shoe.read(now), now);

@@ -1,4 +1,4 @@
-//! Calibration and settings in flash, safe against a loss of power at any moment.
+//! Calibration, settings and bonds in flash, safe against a loss of power at any moment.
 //!
 //! Every save appends a whole record, with all that is kept, to a log over two or more pages: magic, sequence number,
 //! length, CRC-32, then the values. The newest intact record counts. A page is erased only right before it is written to
@@ -16,6 +16,7 @@
 pub(crate) mod flash;
 
 use super::Calibration;
+use crate::bonds::Bonds;
 use crate::checksum::CRC32;
 use crate::tracker::Parameters;
 use core::ops::Range;
@@ -57,6 +58,11 @@ impl Stored for Parameters {
     fn is_fit(&self) -> bool {
         self.check().is_ok()
     }
+}
+
+impl Stored for Bonds {
+    const KEY: u8 = 3;
+    const LAYOUT: u16 = 1;
 }
 
 /// Why something was not loaded or saved.
@@ -396,6 +402,7 @@ impl<F: NorFlash> Store<F> {
 mod tests {
     use super::flash::{Cut, Fault, MockFlash, run};
     use super::*;
+    use crate::bonds::Bond;
     use crate::calibration::{Correction, Point};
     use nalgebra::Vector3;
     use proptest::prelude::*;
@@ -419,6 +426,16 @@ mod tests {
 
     fn parameters(number: u32) -> Parameters {
         Parameters { start_after_s: number as f32, ..Parameters::default() }
+    }
+
+    /// As many as there can be, as long as they can become.
+    fn bonds(number: u8) -> Bonds {
+        let mut bonds = Bonds::NONE;
+        for number in number..number + 4 {
+            let (address, key) = ([number; 6], [!number; 16]);
+            bonds.add(Bond { address_kind: 1, address, identity_key: Some([number; 16]), long_term_key: key });
+        }
+        bonds
     }
 
     fn open(flash: Flash) -> Store<Flash> {
@@ -477,6 +494,28 @@ mod tests {
         run(store.forget::<Calibration>()).unwrap();
         store = open(store.into_flash());
         assert_eq!(kept(&mut store), (None, Some(106)));
+    }
+
+    #[test]
+    fn bonds_are_kept_beside_the_others_and_a_cut_leaves_the_old_or_the_new() {
+        let mut store = open(Flash::new(2));
+        run(store.save(&calibration(1))).unwrap();
+        run(store.save(&parameters(2))).unwrap();
+        run(store.save(&bonds(3))).unwrap();
+        for fuel in 0..200 {
+            let mut flash = store.into_flash();
+            flash.fail_after(fuel, Cut::During(128), u64::from(fuel));
+            store = open(flash);
+            let before = run(store.load::<Bonds>()).unwrap().unwrap();
+            let next = bonds(4 + fuel as u8);
+            let whole = run(store.save(&next)).is_ok();
+            let mut flash = store.into_flash();
+            flash.restore();
+            store = open(flash);
+            let after = run(store.load::<Bonds>()).unwrap().unwrap();
+            assert!(after == next || !whole && after == before, "cut at {fuel}");
+            assert_eq!(kept(&mut store), (Some(1), Some(2)));
+        }
     }
 
     #[test]
@@ -589,8 +628,9 @@ mod tests {
         // When one of these changes, its `LAYOUT` needs the next number, and then this line the new figures.
         assert_eq!((Calibration::LAYOUT, layout(&calibration(1))), (1, (1_302_369_335, 251)));
         assert_eq!((Parameters::LAYOUT, layout(&Parameters::default())), (3, (828_929_439, 359)));
-        let both = layout(&calibration(u32::MAX)).1 + layout(&Parameters::default()).1 + 2 * ENTRY;
-        assert!(both <= PAYLOAD, "{both}");
+        assert_eq!((Bonds::LAYOUT, layout(&bonds(1))), (1, (609_160_294, 161)));
+        let all = layout(&calibration(u32::MAX)).1 + layout(&Parameters::default()).1 + layout(&bonds(1)).1 + 3 * ENTRY;
+        assert!(all <= PAYLOAD, "{all}");
         let _: Point = *calibration(1).gyro.points().next().unwrap();
     }
 

@@ -9,8 +9,11 @@ use crate::time::Micros;
 use crate::tracker::{Output, Parameters, State, Tracker};
 use crate::wire::frame::{self, FRAME_MAX};
 use crate::wire::link::{Identity, Link, Request};
-use crate::wire::message::{Attitude, FromShoe, Level, Log, Raw, RawItem, Refusal, ResetReason, Status, text};
+use crate::wire::message::{
+    Attitude, FromShoe, Level, LinkCounters, Log, Raw, RawItem, Refusal, ResetReason, Status, text,
+};
 use crate::wire::outbox::Outbox;
+use crate::wire::port::Port;
 use crate::wire::transfer::Value;
 use core::borrow::BorrowMut;
 
@@ -43,24 +46,42 @@ pub struct Health {
     pub gyro: DieCounters,
 }
 
-/// The shoe, with room for `STEPS` steps that the laptop does not have yet; they may lie elsewhere, as in [`Link`].
+/// What waits for one laptop, or for the one that is to come.
+#[derive(Debug)]
+struct Outlet {
+    logs: Frames<LOG_BYTES>,
+    /// The status is to be sent.
+    status: bool,
+    /// The attitude is.
+    attitude: bool,
+}
+
+impl Outlet {
+    const EMPTY: Self = Self { logs: Frames::new(), status: false, attitude: false };
+}
+
+/// The shoe, with room for `STEPS` steps that the laptops do not have yet; they may lie elsewhere, as in [`Link`]. There is one
+/// laptop at most at each of `PORTS` ports.
 ///
 /// Whoever calls it does one of many things at a time. What is never inlined has its part of the stack for itself, and not
 /// beside that of all the others.
 #[derive(Debug)]
-pub struct Shoe<const STEPS: usize, O = Outbox<STEPS>> {
+pub struct Shoe<const STEPS: usize, O = Outbox<STEPS>, const PORTS: usize = 1> {
     sensor: Config,
     pipeline: Pipeline,
-    link: Link<STEPS, O>,
+    link: Link<STEPS, O, PORTS>,
     /// Number of the next raw message.
     raw_number: u32,
     raw: Frames<RAW_BYTES>,
-    logs: Frames<LOG_BYTES>,
+    outlets: [Outlet; PORTS],
+    /// The last one, but for what is different from one laptop to the other.
     status: Option<Status>,
     attitude: Option<Attitude>,
     attitude_due: Micros,
     /// The link runs a request whose value takes effect when the board has kept it.
     keeping: bool,
+    /// Others may pair for so long, which the radio is to be told. **Units:** s.
+    pairing: Option<u16>,
     temperature: Option<i8>,
     /// The foot was seen to move, or somebody wanted something.
     moved: Micros,
@@ -71,7 +92,7 @@ pub struct Shoe<const STEPS: usize, O = Outbox<STEPS>> {
     sleeps: u16,
 }
 
-impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
+impl<const STEPS: usize, const PORTS: usize, O: BorrowMut<Outbox<STEPS, PORTS>>> Shoe<STEPS, O, PORTS> {
     /// A shoe that has just started, with what was kept of parameters and calibration.
     pub fn new(
         identity: Identity,
@@ -86,11 +107,12 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             link: Link::new(identity, parameters, calibration, outbox),
             raw_number: 0,
             raw: Frames::new(),
-            logs: Frames::new(),
+            outlets: [const { Outlet::EMPTY }; PORTS],
             status: None,
             attitude: None,
             attitude_due: Micros(i64::MIN),
             keeping: false,
+            pairing: None,
             temperature: None,
             moved: Micros(0),
             seen: Micros(0),
@@ -102,11 +124,11 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
     /// The driver read something.
     #[inline(never)]
     pub fn sensed(&mut self, batch: &Batch) {
-        if self.link.raw() {
+        if self.link.raw().is_some() {
             self.record(RawItem::Batch(batch.clone()));
         }
         self.temperature = batch.temperature.or(self.temperature);
-        let Self { pipeline, link, attitude, attitude_due, moved, seen, .. } = self;
+        let Self { pipeline, link, outlets, attitude, attitude_due, moved, seen, .. } = self;
         pipeline.push(batch, |sample, output, tracker| {
             *seen = sample.time;
             if !output.stance || tracker.rides() {
@@ -118,32 +140,40 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             if sample.time >= *attitude_due {
                 *attitude_due = sample.time + ATTITUDE_US;
                 *attitude = Some(attitude_of(sample, output, tracker));
+                outlets.iter_mut().for_each(|outlet| outlet.attitude = true);
             }
         });
     }
 
-    /// Bytes came from the laptop.
+    /// Bytes came from the laptop of this port.
     #[inline(never)]
-    pub fn received(&mut self, bytes: &[u8], now: Micros) {
-        self.link.receive(bytes, now);
-        while let Some(request) = self.link.request() {
+    pub fn received(&mut self, port: Port, bytes: &[u8], now: Micros) {
+        self.link.receive(port, bytes, now);
+        while let Some((port, request)) = self.link.request() {
             self.moved = now;
-            if let Some(result) = self.carry_out(request) {
+            if let Some(result) = self.carry_out(port, request, now) {
                 self.link.answer(result);
             }
         }
     }
 
+    /// The connection at this port ended.
+    pub fn parted(&mut self, port: Port, now: Micros) {
+        self.link.part(port, now);
+    }
+
     /// Does what was asked for; `None` while it is the board's turn.
-    fn carry_out(&mut self, request: Request) -> Option<Result<(), Refusal>> {
+    fn carry_out(&mut self, port: Port, request: Request, now: Micros) -> Option<Result<(), Refusal>> {
         match request {
             Request::Order(order) => {
                 let obeyed = self.pipeline.obey(order);
-                if obeyed && self.link.raw() {
+                if obeyed && self.link.raw().is_some() {
                     self.record(RawItem::Order(order));
                 }
                 Some(if obeyed { Ok(()) } else { Err(Refusal::NotNow) })
             }
+            // The tracker cannot be reset in the recording of another laptop.
+            Request::Raw(_) if self.link.raw_for_another(port, now) => Some(Err(Refusal::NotNow)),
             Request::Raw(on) => {
                 self.raw.clear();
                 self.raw_number = 0;
@@ -154,13 +184,18 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
                 Some(Ok(()))
             }
             // A raw recording is computed again with one set of values.
-            Request::Write(_) if self.link.raw() => Some(Err(Refusal::NotNow)),
+            Request::Write(_) if self.link.raw().is_some() => Some(Err(Refusal::NotNow)),
             Request::Write(Value::Parameters(parameters)) if !parameters.method.available() => {
                 Some(Err(Refusal::Unsupported))
             }
             Request::Write(_) => {
                 self.keeping = true;
                 None
+            }
+            Request::Pair(_) if PORTS <= Port::Radio.index() => Some(Err(Refusal::Unsupported)),
+            Request::Pair(seconds) => {
+                self.pairing = Some(seconds);
+                Some(Ok(()))
             }
         }
     }
@@ -170,8 +205,19 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
         let raw = Raw { number: self.raw_number, item };
         self.raw_number = self.raw_number.wrapping_add(1);
         if !self.raw.push(&FromShoe::Raw(raw)) {
-            self.link.count_dropped_message();
+            let port = self.link.raw().unwrap_or(Port::Serial);
+            self.link.count_dropped_message(port);
         }
+    }
+
+    /// Whether the laptop of this port records the counts of the sensor.
+    pub fn records(&self, port: Port) -> bool {
+        self.link.raw() == Some(port)
+    }
+
+    /// For how long others may pair from now on, if a laptop has asked for it; told once. **Units:** s.
+    pub fn take_pairing(&mut self) -> Option<u16> {
+        self.pairing.take()
     }
 
     /// A value that the board has to keep over a loss of power; [`Shoe::kept`] tells when it has.
@@ -212,59 +258,80 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Shoe<STEPS, O> {
             reset: health.reset,
             asleep: self.asleep,
             sleeps: self.sleeps,
-            waiting: u16::try_from(self.link.waiting()).unwrap_or(u16::MAX),
+            waiting: 0,
             accel: health.accel,
             gyro: health.gyro,
             tracker: *tracker.counters(),
-            link: self.link.counters(),
+            link: LinkCounters::default(),
         });
+        self.outlets.iter_mut().for_each(|outlet| outlet.status = true);
+    }
+
+    /// The last status, as the laptop of this port is told it.
+    pub fn status(&self, port: Port) -> Option<Status> {
+        let waiting = u16::try_from(self.link.waiting(port)).unwrap_or(u16::MAX);
+        self.status.map(|status| Status { waiting, link: self.link.counters(port), ..status })
     }
 
     /// A line for the log; kept for a while when there is no laptop. The oldest gives way.
     #[inline(never)]
     pub fn log(&mut self, time: Micros, level: Level, line: &str) {
         let line = FromShoe::Log(Log { time, level, text: text(line) });
-        while !self.logs.push(&line) {
-            if self.logs.pop(&mut [0; FRAME_MAX]).is_none() {
-                return;
+        for (outlet, port) in self.outlets.iter_mut().zip(Port::ALL) {
+            while !outlet.logs.push(&line) {
+                if outlet.logs.pop(&mut [0; FRAME_MAX]).is_none() {
+                    break;
+                }
+                self.link.count_dropped_message(port);
             }
-            self.link.count_dropped_message();
         }
     }
 
-    /// The next frame for the laptop: steps and answers first.
+    /// The next frame for the laptop of this port: steps and answers first.
     #[inline(never)]
-    pub fn transmit<'a>(&mut self, now: Micros, buffer: &'a mut [u8; FRAME_MAX]) -> Option<&'a [u8]> {
-        if let Some(length) = self.link.transmit(now, buffer).map(<[u8]>::len) {
+    pub fn transmit<'a>(&mut self, port: Port, now: Micros, buffer: &'a mut [u8; FRAME_MAX]) -> Option<&'a [u8]> {
+        if let Some(length) = self.link.transmit(port, now, buffer).map(<[u8]>::len) {
             return buffer.get(..length);
         }
-        if !self.link.connected() {
+        let raw = self.link.raw();
+        if raw.is_none() {
             self.raw.clear();
-            (self.status, self.attitude) = (None, None);
+        }
+        let outlet = &mut self.outlets[port.index()];
+        if !self.link.connected(port) {
+            (outlet.status, outlet.attitude) = (false, false);
             return None;
         }
-        if !self.logs.is_empty() {
-            return self.logs.pop(buffer);
+        if !outlet.logs.is_empty() {
+            return outlet.logs.pop(buffer);
         }
-        if !self.raw.is_empty() {
+        if raw == Some(port) && !self.raw.is_empty() {
             return self.raw.pop(buffer);
         }
-        let status = self.status.take().map(FromShoe::Status);
-        let message = status.or_else(|| self.attitude.take().map(FromShoe::Attitude))?;
+        let (status, attitude) = (core::mem::take(&mut outlet.status), outlet.attitude);
+        let message = match self.status(port).filter(|_| status) {
+            Some(status) => FromShoe::Status(status),
+            None => {
+                self.outlets[port.index()].attitude = false;
+                FromShoe::Attitude(self.attitude.filter(|_| attitude)?)
+            }
+        };
         frame::encode(&message, buffer).ok()
     }
 
     /// When [`Shoe::transmit`] should be asked again if nothing happens before; a time that has passed means at once.
-    pub fn deadline(&self, now: Micros) -> Micros {
-        let pending = !self.logs.is_empty() || !self.raw.is_empty() || self.status.is_some() || self.attitude.is_some();
-        if pending && self.link.connected() { now } else { self.link.deadline(now) }
+    pub fn deadline(&self, port: Port, now: Micros) -> Micros {
+        let outlet = &self.outlets[port.index()];
+        let raw = self.link.raw() == Some(port) && !self.raw.is_empty();
+        let pending = raw || !outlet.logs.is_empty() || outlet.status || outlet.attitude;
+        if pending && self.link.connected(port) { now } else { self.link.deadline(port, now) }
     }
 
     /// Whether the sensor should sleep: the foot has stood for the time that is set, nobody wants anything, and no raw
     /// recording runs. While it sleeps that stays so until a command comes.
     pub fn drowsy(&self) -> bool {
         let after_us = (self.tracker().parameters().sleep_after_s * 1e6) as i64;
-        let still = self.pipeline.tracker().state() == State::Tracking && !self.link.raw();
+        let still = self.pipeline.tracker().state() == State::Tracking && self.link.raw().is_none();
         still && after_us > 0 && self.seen - self.moved >= after_us
     }
 
@@ -336,13 +403,13 @@ mod tests {
     }
 
     fn hear(shoe: &mut Shoe<64>, message: &ToShoe, now: Micros) {
-        shoe.received(frame::encode(message, &mut [0; FRAME_MAX]).unwrap(), now);
+        shoe.received(Port::Serial, frame::encode(message, &mut [0; FRAME_MAX]).unwrap(), now);
     }
 
     fn say(shoe: &mut Shoe<64>, now: Micros) -> Vec<FromShoe> {
         let mut said = Vec::new();
         let mut buffer = [0; FRAME_MAX];
-        while let Some(mut frame) = shoe.transmit(now, &mut buffer) {
+        while let Some(mut frame) = shoe.transmit(Port::Serial, now, &mut buffer) {
             said.push(AnyDecoder::new().next(&mut frame).unwrap().unwrap());
         }
         said
@@ -508,13 +575,13 @@ mod tests {
         let hello = LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session: 1, software: text("test") };
         hear(&mut shoe, &ToShoe::Hello(hello), Micros(30));
         shoe.report(Micros(40), &Health { stack: 1_234, ..Health::default() });
-        assert_eq!(shoe.deadline(Micros(40)), Micros(40));
+        assert_eq!(shoe.deadline(Port::Serial, Micros(40)), Micros(40));
         let said = say(&mut shoe, Micros(40));
         let lines: Vec<_> = said.iter().filter(|message| matches!(message, FromShoe::Log(_))).collect();
         // The newest: two pairs of a long and a short line are 300 bytes with their times.
         assert!(matches!(lines[..], [.., FromShoe::Log(long), FromShoe::Log(last)]
             if long.text.len() == 120 && last.text.len() == 30 && last.time == Micros(11) && (4..12).contains(&lines.len())));
         assert!(said.iter().any(|message| matches!(message, FromShoe::Status(status) if status.stack == 1_234)));
-        assert!(shoe.deadline(Micros(40)) > Micros(40), "nothing is left");
+        assert!(shoe.deadline(Port::Serial, Micros(40)) > Micros(40), "nothing is left");
     }
 }

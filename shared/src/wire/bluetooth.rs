@@ -25,3 +25,5 @@ pub const NAME_PREFIX: &str = "Sohle-";
 pub const MTU: u16 = 247;
 /// Of a notification or a write within the attribute MTU. **Units:** bytes.
 pub const HEADER: u16 = 3;
+/// A [`STATUS`] is never longer. **Units:** bytes.
+pub const STATUS_MAX: usize = 240;

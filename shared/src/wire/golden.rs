@@ -126,6 +126,7 @@ fn from_shoe() -> Vec<FromShoe> {
         FromShoe::Step(sent()),
         reply(Outcome::Done),
         reply(Outcome::Refused(Refusal::Piece(128))),
+        reply(Outcome::Refused(Refusal::Port)),
         reply(Outcome::Piece(piece())),
         FromShoe::TimeReply(TimeReply { number: 9, received: Micros(1_000_000), sent: Micros(1_000_400) }),
         FromShoe::Raw(Raw { number: 0, item: RawItem::Start(Config::default()) }),
@@ -152,6 +153,7 @@ fn to_shoe() -> Vec<ToShoe> {
         command(Action::Write(Item::Parameters, piece())),
         command(Action::Read(Item::Calibration, 256)),
         command(Action::Resend),
+        command(Action::Pair(60)),
     ]
 }
 

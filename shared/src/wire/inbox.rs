@@ -96,6 +96,7 @@ impl Inbox {
 mod tests {
     use super::super::golden;
     use super::super::outbox::{Outbox, Pace};
+    use super::super::port::Port;
     use super::*;
     use crate::step::Step;
     use crate::time::Micros;
@@ -180,7 +181,7 @@ mod tests {
                 if tick % 100 == 0 && tick < 3_000 {
                     outbox.push(sent(tick / 100, 0).step);
                 }
-                if let Some(sent) = outbox.next(now) {
+                if let Some(sent) = outbox.next(Port::Serial, now) {
                     match chance.next().unwrap() {
                         lost if lost < loss => {}
                         delayed if delayed % 3 == 0 => late.push(sent),
@@ -195,8 +196,8 @@ mod tests {
                 }
                 got.extend(drain(&mut inbox));
                 if let Some(ack) = inbox.ack().filter(|_| chance.next().unwrap() >= loss) {
-                    outbox.hear(now);
-                    outbox.acknowledge(&ack, now);
+                    outbox.hear(Port::Serial, now);
+                    outbox.acknowledge(Port::Serial, &ack, now);
                 }
             }
             prop_assert_eq!(got, (0..30).map(Ok).collect::<Vec<_>>());

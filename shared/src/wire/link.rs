@@ -2,14 +2,15 @@
 //!
 //! A [`Link`] owns the steps that wait, answers hellos, questions for the time and repeated commands, and puts parameters
 //! together. The firmware gives it the bytes that come and the steps that are made, sends the frames it hands out, and
-//! carries out its [`Request`]s. Before a laptop with the same messages has said hello, nothing but hellos is sent.
+//! carries out its [`Request`]s. Before a laptop with the same messages has said hello, nothing but hellos is sent. With two
+//! [`Port`]s there can be two laptops at a time, which know nothing of each other.
 
 use super::frame::{self, Decoder, FRAME_MAX};
-use super::message::{
-    Action, Command, FromShoe, Hello, LaptopHello, LinkCounters, Outcome, Refusal, Reply, TimeReply, ToShoe, text,
-};
+use super::desk::{CommandState, Desk, Peer};
+use super::message::{Action, Command, FromShoe, Hello, LaptopHello, LinkCounters, Outcome, Refusal, ToShoe, text};
 use super::outbox::Outbox;
 use super::packed::PackedStep;
+use super::port::Port;
 use super::transfer::{self, Assembly, Item, Value};
 
 use super::{PROTOCOL, SCHEMA};
@@ -18,11 +19,6 @@ use crate::step::Step;
 use crate::time::Micros;
 use crate::tracker::{Order, Parameters};
 use core::borrow::BorrowMut;
-
-/// Between two hellos that nobody answers. **Units:** microseconds.
-const HELLO_US: i64 = 1_000_000;
-/// The same while what comes cannot be understood: it may have been the answer. **Units:** microseconds.
-const SAID_AGAIN_US: i64 = 100_000;
 
 /// The laptop's longest message with its checksum: a piece of the parameters. **Units:** bytes.
 const TO_SHOE_MAX: usize = transfer::CHUNK_MAX + 40;
@@ -51,64 +47,29 @@ pub enum Request {
     Raw(bool),
     /// Put this into effect, and keep it.
     Write(Value),
+    /// Let other devices pair by Bluetooth for so long. **Units:** s.
+    Pair(u16),
 }
 
-/// The laptop that said hello.
-#[derive(Clone, Debug)]
-struct Peer {
-    session: u32,
-    command: CommandState,
-    /// The reply is to be sent.
-    reply_due: bool,
-}
-
-/// The last command.
-#[derive(Clone, Debug)]
-enum CommandState {
-    /// None yet.
-    None,
-    /// To be handed to the firmware.
-    Waiting(u32, Request),
-    /// In its hands.
-    Running(u32, Request),
-    /// Answered.
-    Answered(u32, Outcome),
-}
-
-impl CommandState {
-    fn number(&self) -> Option<u32> {
-        match self {
-            Self::None => None,
-            Self::Waiting(number, _) | Self::Running(number, _) | Self::Answered(number, _) => Some(*number),
-        }
-    }
-
-    fn open(&self) -> bool {
-        matches!(self, Self::Waiting(..) | Self::Running(..))
-    }
-}
-
-/// The shoe's end of the wire, with room for `STEPS` steps.
+/// The shoe's end of the wire, with room for `STEPS` steps and `PORTS` laptops, one at each port.
 ///
-/// They may lie elsewhere (`O` is then `&mut Outbox<STEPS>`): a thousand take 23 kB, which no microcontroller should have
-/// on its stack while they are put in their place.
+/// The steps may lie elsewhere (`O` is then `&mut Outbox<STEPS, PORTS>`): a thousand take 23 kB, which no microcontroller
+/// should have on its stack while they are put in their place.
 #[derive(Debug)]
-pub struct Link<const STEPS: usize, O = Outbox<STEPS>> {
+pub struct Link<const STEPS: usize, O = Outbox<STEPS>, const PORTS: usize = 1> {
     identity: Identity,
     parameters: Parameters,
     calibration: Calibration,
     assembly: Assembly,
-    decoder: ToShoeDecoder,
     outbox: O,
-    peer: Option<Peer>,
-    hello_due: Micros,
-    /// A question for the time, and when it came.
-    question: Option<(u32, Micros)>,
-    raw: bool,
-    messages_dropped: u32,
+    desks: [Desk; PORTS],
+    /// Whose request is in the hands of the firmware.
+    running: Option<Port>,
+    /// Who wants the counts of the sensor.
+    raw: Option<Port>,
 }
 
-impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
+impl<const STEPS: usize, const PORTS: usize, O: BorrowMut<Outbox<STEPS, PORTS>>> Link<STEPS, O, PORTS> {
     /// Before the first byte. `parameters` and `calibration` are those in effect, `outbox` is empty.
     pub fn new(identity: Identity, parameters: &Parameters, calibration: &Calibration, mut outbox: O) -> Self {
         outbox.borrow_mut().belong_to(identity.boot);
@@ -117,103 +78,112 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
             parameters: *parameters,
             calibration: *calibration,
             assembly: Assembly::new(),
-            decoder: ToShoeDecoder::new(),
             outbox,
-            peer: None,
-            hello_due: Micros(0),
-            question: None,
-            raw: false,
-            messages_dropped: 0,
+            desks: core::array::from_fn(|_| Desk::new()),
+            running: None,
+            raw: None,
         }
     }
 
-    /// Keeps a step until the laptop has it.
+    fn desk(&self, port: Port) -> &Desk {
+        &self.desks[port.index()]
+    }
+
+    fn desk_mut(&mut self, port: Port) -> &mut Desk {
+        &mut self.desks[port.index()]
+    }
+
+    /// Keeps a step until the laptops have it.
     pub fn push(&mut self, step: &Step) {
         self.outbox.borrow_mut().push(PackedStep::pack(step));
     }
 
     /// Whether a laptop with the same messages has said hello: only then other messages make sense.
-    pub fn connected(&self) -> bool {
-        self.peer.is_some()
+    pub fn connected(&self, port: Port) -> bool {
+        self.desk(port).peer.is_some()
     }
 
-    /// Whether the laptop wants the counts of the sensor.
-    pub fn raw(&self) -> bool {
-        self.raw && self.connected()
+    /// The laptop that wants the counts of the sensor.
+    pub fn raw(&self) -> Option<Port> {
+        self.raw.filter(|&port| self.connected(port))
     }
 
-    /// Steps that wait for their acknowledgement.
-    pub fn waiting(&self) -> usize {
-        self.outbox.borrow().len()
+    /// Whether another laptop, which is still there, records the counts of the sensor.
+    pub fn raw_for_another(&self, port: Port, now: Micros) -> bool {
+        self.raw().is_some_and(|other| other != port && !self.outbox.borrow().is_silent(other, now))
+    }
+
+    /// Steps that wait for the acknowledgement of this laptop.
+    pub fn waiting(&self, port: Port) -> usize {
+        self.outbox.borrow().waiting(port)
     }
 
     /// What was counted since the boot.
-    pub fn counters(&self) -> LinkCounters {
+    pub fn counters(&self, port: Port) -> LinkCounters {
+        let (desk, outbox) = (self.desk(port), self.outbox.borrow());
         LinkCounters {
-            frames: *self.decoder.counters(),
-            steps_resent: self.outbox.borrow().resent(),
-            steps_dropped: self.outbox.borrow().dropped(),
-            messages_dropped: self.messages_dropped,
+            frames: *desk.decoder.counters(),
+            steps_resent: outbox.resent(port),
+            steps_dropped: outbox.dropped(port),
+            messages_dropped: desk.messages_dropped,
         }
     }
 
     /// Counts a message that was not sent because the line was busy.
-    pub fn count_dropped_message(&mut self) {
-        self.messages_dropped = self.messages_dropped.saturating_add(1);
+    pub fn count_dropped_message(&mut self, port: Port) {
+        let desk = self.desk_mut(port);
+        desk.messages_dropped = desk.messages_dropped.saturating_add(1);
     }
 
     /// Takes in bytes of the laptop, in whatever pieces they come.
-    pub fn receive(&mut self, mut bytes: &[u8], now: Micros) {
-        while let Some(frame) = self.decoder.next(&mut bytes) {
+    pub fn receive(&mut self, port: Port, mut bytes: &[u8], now: Micros) {
+        while let Some(frame) = self.desk_mut(port).decoder.next(&mut bytes) {
             let Ok(message) = frame else {
-                self.unreadable(now);
+                self.desk_mut(port).unreadable(now);
                 continue;
             };
-            self.outbox.borrow_mut().hear(now);
+            self.outbox.borrow_mut().hear(port, now);
             match message {
-                ToShoe::Hello(hello) => self.greet(&hello, now),
+                ToShoe::Hello(hello) => self.greet(port, &hello, now),
                 ToShoe::Ack(ack) => {
                     if ack.boot == self.identity.boot {
-                        self.outbox.borrow_mut().acknowledge(&ack, now);
+                        self.outbox.borrow_mut().acknowledge(port, &ack, now);
                     }
                 }
-                ToShoe::TimeRequest(number) => self.question = Some((number, now)),
-                ToShoe::Command(command) => self.command(command, now),
+                ToShoe::TimeRequest(number) => self.desk_mut(port).question = Some((number, now)),
+                ToShoe::Command(command) => self.command(port, command, now),
             }
         }
     }
 
-    fn unreadable(&mut self, now: Micros) {
-        if !self.connected() {
-            let soonest = self.hello_due + (SAID_AGAIN_US - HELLO_US);
-            self.hello_due = self.hello_due.min(soonest.max(now));
-        }
+    /// The connection at this port ended; a cable that is pulled out does not tell.
+    pub fn part(&mut self, port: Port, now: Micros) {
+        self.desk_mut(port).part(now);
+        self.raw = self.raw.filter(|&of| of != port);
     }
 
-    fn greet(&mut self, hello: &LaptopHello, now: Micros) {
-        self.hello_due = now;
+    fn greet(&mut self, port: Port, hello: &LaptopHello, now: Micros) {
+        let outbox = self.outbox.borrow_mut();
+        let desk = &mut self.desks[port.index()];
+        desk.hello_due = now;
         if (hello.protocol, hello.schema) != (PROTOCOL, SCHEMA) {
-            self.peer = None;
+            desk.peer = None;
+            outbox.disengage(port);
             return;
         }
-        if self.peer.as_ref().is_none_or(|peer| peer.session != hello.session) {
-            self.peer = Some(Peer { session: hello.session, command: CommandState::None, reply_due: false });
-            self.raw = false;
-            self.outbox.borrow_mut().start_over(now);
+        if desk.peer.as_ref().is_none_or(|peer| peer.session != hello.session) {
+            desk.peer = Some(Peer::new(hello.session));
+            self.raw = self.raw.filter(|&of| of != port);
+            self.running = self.running.filter(|&of| of != port);
+            outbox.start_over(port, now);
         }
-        self.outbox.borrow_mut().resend_all(now);
+        outbox.resend_all(port, now);
     }
 
-    fn command(&mut self, command: Command, now: Micros) {
-        let Some(peer) = self.peer.as_mut().filter(|peer| peer.session == command.session) else { return };
-        match peer.command.number() {
-            Some(number) if number == command.number => {
-                peer.reply_due = !peer.command.open();
-                return;
-            }
-            // An old one that comes late has been answered; a new one has to wait for the one before.
-            Some(number) if number > command.number || peer.command.open() => return,
-            _ => {}
+    fn command(&mut self, port: Port, command: Command, now: Micros) {
+        let Some(peer) = self.desks[port.index()].peer.as_mut() else { return };
+        if !peer.accepts(&command) {
+            return;
         }
         let ask = |request| CommandState::Waiting(command.number, request);
         let tell = |outcome| CommandState::Answered(command.number, outcome);
@@ -233,24 +203,35 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
                 tell(value.chunk(offset).map_or_else(Outcome::Refused, Outcome::Piece))
             }
             Action::Resend => {
-                self.outbox.borrow_mut().resend_all(now);
+                self.outbox.borrow_mut().resend_all(port, now);
                 tell(Outcome::Done)
             }
+            Action::Pair(_) if port == Port::Radio => tell(Outcome::Refused(Refusal::Port)),
+            Action::Pair(seconds) => ask(Request::Pair(seconds)),
         };
         peer.reply_due = !peer.command.open();
     }
 
-    /// What the firmware has to do, once. It must be answered before the next one comes.
-    pub fn request(&mut self) -> Option<Request> {
-        let command = &mut self.peer.as_mut()?.command;
-        let CommandState::Waiting(number, request) = *command else { return None };
-        *command = CommandState::Running(number, request);
-        Some(request)
+    /// What the firmware has to do, once, and for whom. It must be answered before the next one comes.
+    pub fn request(&mut self) -> Option<(Port, Request)> {
+        if self.running.is_some() {
+            return None;
+        }
+        for (desk, port) in self.desks.iter_mut().zip(Port::ALL) {
+            if let Some(peer) = &mut desk.peer
+                && let CommandState::Waiting(number, request) = peer.command
+            {
+                peer.command = CommandState::Running(number, request);
+                self.running = Some(port);
+                return Some((port, request));
+            }
+        }
+        None
     }
 
     /// The request that was handed out last, as long as it is not answered.
     pub fn running(&self) -> Option<&Request> {
-        match &self.peer.as_ref()?.command {
+        match &self.desk(self.running?).peer.as_ref()?.command {
             CommandState::Running(_, request) => Some(request),
             _ => None,
         }
@@ -258,69 +239,66 @@ impl<const STEPS: usize, O: BorrowMut<Outbox<STEPS>>> Link<STEPS, O> {
 
     /// Answers the request that was handed out last.
     pub fn answer(&mut self, result: Result<(), Refusal>) {
-        let Some(peer) = &mut self.peer else { return };
+        let Some(port) = self.running.take() else { return };
+        let Some(peer) = &mut self.desks[port.index()].peer else { return };
         let CommandState::Running(number, request) = peer.command else { return };
+        peer.command = CommandState::Answered(number, result.map_or_else(Outcome::Refused, |()| Outcome::Done));
+        peer.reply_due = true;
         if result.is_ok() {
             match request {
                 Request::Write(Value::Parameters(parameters)) => self.parameters = parameters,
                 Request::Write(Value::Calibration(calibration)) => self.calibration = calibration,
-                Request::Raw(on) => self.raw = on,
-                Request::Order(_) => {}
+                Request::Raw(true) => self.raw = Some(port),
+                Request::Raw(false) => self.raw = self.raw.filter(|&of| of != port),
+                Request::Order(_) | Request::Pair(_) => {}
             }
         }
-        peer.command = CommandState::Answered(number, result.map_or_else(Outcome::Refused, |()| Outcome::Done));
-        peer.reply_due = true;
     }
 
-    /// The next frame of the link's own that is to be sent now.
-    pub fn transmit<'a>(&mut self, now: Micros, buffer: &'a mut [u8; FRAME_MAX]) -> Option<&'a [u8]> {
-        let message = self.next(now)?;
+    /// The next frame of the link's own that is to be sent now to the laptop of this port.
+    pub fn transmit<'a>(&mut self, port: Port, now: Micros, buffer: &'a mut [u8; FRAME_MAX]) -> Option<&'a [u8]> {
+        let message = self.next(port, now)?;
         // Every message fits, as the tests show for the largest of each.
         frame::encode(&message, buffer).ok()
     }
 
-    fn next(&mut self, now: Micros) -> Option<FromShoe> {
-        if now >= self.hello_due {
-            self.hello_due = if self.connected() { Micros(i64::MAX) } else { now + HELLO_US };
-            return Some(FromShoe::Hello(self.hello()));
+    fn next(&mut self, port: Port, now: Micros) -> Option<FromShoe> {
+        let desk = self.desk_mut(port);
+        if desk.take_hello(now) {
+            return Some(FromShoe::Hello(self.hello(port)));
         }
-        let peer = self.peer.as_mut()?;
-        if let Some((number, received)) = self.question.take() {
-            return Some(FromShoe::TimeReply(TimeReply { number, received, sent: now }));
-        }
-        if let (true, CommandState::Answered(number, outcome)) = (peer.reply_due, &peer.command) {
-            peer.reply_due = false;
-            return Some(FromShoe::Reply(Reply { session: peer.session, number: *number, outcome: outcome.clone() }));
-        }
-        self.outbox.borrow_mut().next(now).map(FromShoe::Step)
+        desk.peer.as_ref()?;
+        desk.take_answer(now).or_else(|| self.outbox.borrow_mut().next(port, now).map(FromShoe::Step))
     }
 
-    fn hello(&self) -> Hello {
+    fn hello(&self, port: Port) -> Hello {
         Hello {
             protocol: PROTOCOL,
             schema: SCHEMA,
             boot: self.identity.boot,
-            accepted: self.connected(),
+            accepted: self.connected(port),
             firmware: text(self.identity.firmware),
             board: text(self.identity.board),
         }
     }
 
     /// When [`Link::transmit`] should be asked again if nothing happens before; a time that has passed means at once.
-    pub fn deadline(&self, now: Micros) -> Micros {
-        let Some(peer) = &self.peer else { return self.hello_due };
-        if peer.reply_due || self.question.is_some() {
+    pub fn deadline(&self, port: Port, now: Micros) -> Micros {
+        let desk = self.desk(port);
+        let Some(peer) = &desk.peer else { return desk.hello_due };
+        if peer.reply_due || desk.question.is_some() {
             return now;
         }
-        self.outbox.borrow().deadline(now).map_or(self.hello_due, |due| due.min(self.hello_due))
+        self.outbox.borrow().deadline(port, now).map_or(desk.hello_due, |due| due.min(desk.hello_due))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::frame::AnyDecoder;
+    use super::super::desk::{HELLO_US, SAID_AGAIN_US};
     use super::super::golden;
-    use super::super::message::Ack;
+    use super::super::message::{Ack, TimeReply};
     use super::super::outbox::Pace;
     use super::*;
     use proptest::prelude::*;
@@ -334,13 +312,13 @@ mod tests {
     }
 
     fn hear(link: &mut Link<16>, message: &ToShoe, now: Micros) {
-        link.receive(frame::encode(message, &mut [0; FRAME_MAX]).unwrap(), now);
+        link.receive(Port::Serial, frame::encode(message, &mut [0; FRAME_MAX]).unwrap(), now);
     }
 
     fn say(link: &mut Link<16>, now: Micros) -> Vec<FromShoe> {
         let mut said = Vec::new();
         let mut buffer = [0; FRAME_MAX];
-        while let Some(mut frame) = link.transmit(now, &mut buffer) {
+        while let Some(mut frame) = link.transmit(Port::Serial, now, &mut buffer) {
             said.push(AnyDecoder::new().next(&mut frame).unwrap().unwrap());
         }
         said
@@ -378,7 +356,7 @@ mod tests {
         hear(&mut link, &ToShoe::TimeRequest(1), Micros(0));
         let only_hello = |said: &[FromShoe]| matches!(said, [FromShoe::Hello(hello)] if !hello.accepted);
         assert!(only_hello(&say(&mut link, Micros(0))));
-        assert_eq!(link.deadline(Micros(0)), Micros(HELLO_US));
+        assert_eq!(link.deadline(Port::Serial, Micros(0)), Micros(HELLO_US));
         assert!(say(&mut link, Micros(HELLO_US - 1)).is_empty());
         assert!(only_hello(&say(&mut link, Micros(HELLO_US))));
         hear(&mut link, &hello(SESSION, SCHEMA ^ 1), Micros(HELLO_US + 1));
@@ -388,7 +366,7 @@ mod tests {
         assert!(matches!(said[..], [FromShoe::Hello(_), FromShoe::TimeReply(_), FromShoe::Step(_)]));
         // Another program replaces the one that was there.
         hear(&mut link, &hello(SESSION, SCHEMA ^ 1), Micros(HELLO_US + 3));
-        assert!(!link.connected());
+        assert!(!link.connected(Port::Serial));
     }
 
     #[test]
@@ -396,14 +374,14 @@ mod tests {
         let mut link = link();
         assert_eq!(say(&mut link, Micros(0)).len(), 1);
         let garbage = [0, 9, 9, 0];
-        link.receive(&garbage, Micros(20_000));
-        assert_eq!(link.deadline(Micros(20_000)), Micros(SAID_AGAIN_US));
+        link.receive(Port::Serial, &garbage, Micros(20_000));
+        assert_eq!(link.deadline(Port::Serial, Micros(20_000)), Micros(SAID_AGAIN_US));
         assert_eq!(say(&mut link, Micros(SAID_AGAIN_US)).len(), 1);
-        link.receive(&garbage, Micros(500_000));
+        link.receive(Port::Serial, &garbage, Micros(500_000));
         assert_eq!(say(&mut link, Micros(500_000)).len(), 1);
-        assert_eq!(link.deadline(Micros(500_000)), Micros(500_000 + HELLO_US));
+        assert_eq!(link.deadline(Port::Serial, Micros(500_000)), Micros(500_000 + HELLO_US));
         let mut link = connected();
-        link.receive(&garbage, Micros(500_000));
+        link.receive(Port::Serial, &garbage, Micros(500_000));
         assert!(say(&mut link, Micros(900_000)).is_empty());
     }
 
@@ -420,7 +398,7 @@ mod tests {
         let mut link = connected();
         let init = command(1, Action::Order(Order::Init));
         hear(&mut link, &init, Micros(1));
-        assert_eq!(link.request(), Some(Request::Order(Order::Init)));
+        assert_eq!(link.request(), Some((Port::Serial, Request::Order(Order::Init))));
         // It is still being carried out when it comes again, and so is another one.
         hear(&mut link, &init, Micros(1));
         hear(&mut link, &command(2, Action::Order(Order::Reset)), Micros(1));
@@ -431,7 +409,7 @@ mod tests {
         hear(&mut link, &init, Micros(1));
         assert_eq!((link.request(), replies(&mut link)), (None, [reply].into()));
         hear(&mut link, &command(2, Action::Order(Order::Reset)), Micros(1));
-        assert_eq!(link.request(), Some(Request::Order(Order::Reset)));
+        assert_eq!(link.request(), Some((Port::Serial, Request::Order(Order::Reset))));
         link.answer(Ok(()));
         assert_eq!(replies(&mut link), [(2, Outcome::Done)]);
         hear(&mut link, &init, Micros(1));
@@ -442,11 +420,11 @@ mod tests {
     fn the_numbers_of_another_session_begin_anew() {
         let mut link = connected();
         hear(&mut link, &command(1, Action::Raw(true)), Micros(1));
-        assert_eq!((link.request(), link.raw()), (Some(Request::Raw(true)), false));
+        assert_eq!((link.request(), link.raw()), (Some((Port::Serial, Request::Raw(true))), None));
         link.answer(Ok(()));
-        assert!(link.raw());
+        assert_eq!(link.raw(), Some(Port::Serial));
         hear(&mut link, &hello(SESSION + 1, SCHEMA), Micros(2));
-        assert!(!link.raw());
+        assert_eq!(link.raw(), None);
         say(&mut link, Micros(2));
         hear(&mut link, &command(2, Action::Raw(true)), Micros(3));
         assert!(link.request().is_none() && replies(&mut link).is_empty(), "a command of the session before");
@@ -455,7 +433,7 @@ mod tests {
             &ToShoe::Command(Command { session: SESSION + 1, number: 1, action: Action::Order(Order::Init) }),
             Micros(4),
         );
-        assert_eq!(link.request(), Some(Request::Order(Order::Init)));
+        assert_eq!(link.request(), Some((Port::Serial, Request::Order(Order::Init))));
     }
 
     #[test]
@@ -475,7 +453,7 @@ mod tests {
             assert_eq!(replies(&mut link), [(number, Outcome::Done)]);
         }
         hear(&mut link, &command(number + 1, Action::Read(Item::Parameters, 0)), Micros(1));
-        assert_eq!(link.request(), Some(Request::Write(Value::Parameters(new))));
+        assert_eq!(link.request(), Some((Port::Serial, Request::Write(Value::Parameters(new)))));
         link.answer(Ok(()));
         assert_eq!(replies(&mut link), [(number, Outcome::Done)]);
         hear(&mut link, &command(number + 1, Action::Read(Item::Parameters, 128)), Micros(1));
@@ -489,7 +467,7 @@ mod tests {
             let piece = Value::Parameters(Parameters::documented()).chunk(offset).unwrap();
             hear(&mut link, &command(1 + u32::from(offset), Action::Write(Item::Parameters, piece)), Micros(1));
         }
-        assert!(matches!(link.request(), Some(Request::Write(Value::Parameters(_)))));
+        assert!(matches!(link.request(), Some((Port::Serial, Request::Write(Value::Parameters(_))))));
         link.answer(Err(Refusal::Value));
         hear(&mut link, &command(999, Action::Read(Item::Parameters, 0)), Micros(1));
         let old = Outcome::Piece(Value::Parameters(Parameters::default()).chunk(0).unwrap());
@@ -502,10 +480,90 @@ mod tests {
         link.push(&golden::step());
         assert!(matches!(say(&mut link, Micros(10))[..], [FromShoe::Step(_)]));
         hear(&mut link, &ToShoe::Ack(Ack { boot: 2, next: 1, later: 0 }), Micros(20));
-        assert_eq!(link.waiting(), 1);
+        assert_eq!(link.waiting(Port::Serial), 1);
         hear(&mut link, &ToShoe::Ack(Ack { boot: 3, next: 1, later: 0 }), Micros(20));
-        assert_eq!(link.waiting(), 0);
-        assert_eq!(link.deadline(Micros(20)), Micros(i64::MAX));
+        assert_eq!(link.waiting(Port::Serial), 0);
+        assert_eq!(link.deadline(Port::Serial, Micros(20)), Micros(i64::MAX));
+    }
+
+    /// A shoe with a radio, and a laptop at each of its ports.
+    fn both() -> Link<16, Outbox<16, 2>, 2> {
+        let identity = Identity { boot: 3, firmware: "1.2.3", board: "bench" };
+        let outbox = Outbox::new(0, Pace::default());
+        let mut link = Link::new(identity, &Parameters::default(), &Calibration::default(), outbox);
+        for (session, port) in (SESSION..).zip(Port::ALL) {
+            hear_at(&mut link, port, &hello(session, SCHEMA), Micros(0));
+            assert!(matches!(&say_at(&mut link, port, Micros(0))[..], [FromShoe::Hello(hello)] if hello.accepted));
+        }
+        link
+    }
+
+    fn hear_at(link: &mut Link<16, Outbox<16, 2>, 2>, port: Port, message: &ToShoe, now: Micros) {
+        link.receive(port, frame::encode(message, &mut [0; FRAME_MAX]).unwrap(), now);
+    }
+
+    fn say_at(link: &mut Link<16, Outbox<16, 2>, 2>, port: Port, now: Micros) -> Vec<FromShoe> {
+        let mut said = Vec::new();
+        let mut buffer = [0; FRAME_MAX];
+        while let Some(mut frame) = link.transmit(port, now, &mut buffer) {
+            said.push(AnyDecoder::new().next(&mut frame).unwrap().unwrap());
+        }
+        said
+    }
+
+    fn command_at(port: Port, number: u32, action: Action) -> ToShoe {
+        ToShoe::Command(Command { session: SESSION + port.index() as u32, number, action })
+    }
+
+    #[test]
+    fn each_laptop_is_answered_what_it_has_asked() {
+        let mut link = both();
+        hear_at(&mut link, Port::Serial, &command_at(Port::Serial, 1, Action::Order(Order::Init)), Micros(1));
+        hear_at(&mut link, Port::Radio, &command_at(Port::Radio, 1, Action::Order(Order::Reset)), Micros(1));
+        hear_at(&mut link, Port::Radio, &ToShoe::TimeRequest(8), Micros(1));
+        assert_eq!(link.request(), Some((Port::Serial, Request::Order(Order::Init))));
+        assert_eq!(link.request(), None, "one after the other");
+        link.answer(Err(Refusal::NotNow));
+        assert_eq!(link.request(), Some((Port::Radio, Request::Order(Order::Reset))));
+        link.answer(Ok(()));
+        let refused = Outcome::Refused(Refusal::NotNow);
+        assert!(matches!(&say_at(&mut link, Port::Serial, Micros(2))[..],
+            [FromShoe::Reply(reply)] if reply.outcome == refused && reply.session == SESSION));
+        assert!(matches!(&say_at(&mut link, Port::Radio, Micros(2))[..],
+            [FromShoe::TimeReply(_), FromShoe::Reply(reply)] if reply.outcome == Outcome::Done));
+    }
+
+    #[test]
+    fn others_may_pair_when_who_has_the_cable_says_so() {
+        let mut link = both();
+        hear_at(&mut link, Port::Radio, &command_at(Port::Radio, 1, Action::Pair(60)), Micros(1));
+        assert_eq!(link.request(), None);
+        assert!(matches!(&say_at(&mut link, Port::Radio, Micros(1))[..],
+            [FromShoe::Reply(reply)] if reply.outcome == Outcome::Refused(Refusal::Port)));
+        hear_at(&mut link, Port::Serial, &command_at(Port::Serial, 1, Action::Pair(60)), Micros(1));
+        assert_eq!(link.request(), Some((Port::Serial, Request::Pair(60))));
+    }
+
+    #[test]
+    fn who_comes_back_is_greeted_first_and_goes_on() {
+        let mut link = both();
+        hear_at(&mut link, Port::Radio, &command_at(Port::Radio, 1, Action::Raw(true)), Micros(1));
+        assert_eq!(link.request(), Some((Port::Radio, Request::Raw(true))));
+        link.answer(Ok(()));
+        say_at(&mut link, Port::Radio, Micros(1));
+        assert!(link.raw_for_another(Port::Serial, Micros(2)) && !link.raw_for_another(Port::Radio, Micros(2)));
+        // Half a frame, then the connection breaks.
+        link.receive(Port::Radio, &[0, 9, 9], Micros(2));
+        link.part(Port::Radio, Micros(2));
+        assert_eq!(link.raw(), None);
+        link.push(&golden::step());
+        hear_at(&mut link, Port::Radio, &hello(SESSION + 1, SCHEMA), Micros(3));
+        let said = say_at(&mut link, Port::Radio, Micros(3));
+        assert!(matches!(said[..], [FromShoe::Hello(_), FromShoe::Step(_)]), "{said:?}");
+        assert_eq!(link.counters(Port::Radio).frames.good, 3, "the hello came whole");
+        // Its command comes again and is not carried out again.
+        hear_at(&mut link, Port::Radio, &command_at(Port::Radio, 1, Action::Raw(true)), Micros(4));
+        assert_eq!(link.request(), None);
     }
 
     #[test]
@@ -522,15 +580,15 @@ mod tests {
             let mut link = connected();
             for (bytes, kind, now) in chunks {
                 match kind {
-                    0 => link.receive(&bytes, Micros(now)),
-                    1 => link.receive(frame::encode(&bytes[..], &mut [0; FRAME_MAX]).unwrap(), Micros(now)),
+                    0 => link.receive(Port::Serial, &bytes, Micros(now)),
+                    1 => link.receive(Port::Serial, frame::encode(&bytes[..], &mut [0; FRAME_MAX]).unwrap(), Micros(now)),
                     _ => link.push(&golden::step()),
                 }
                 link.request();
                 link.answer(Ok(()));
-                link.deadline(Micros(now));
+                link.deadline(Port::Serial, Micros(now));
                 for _ in 0..4 {
-                    link.transmit(Micros(now), &mut [0; FRAME_MAX]);
+                    link.transmit(Port::Serial, Micros(now), &mut [0; FRAME_MAX]);
                 }
             }
         }

@@ -276,6 +276,9 @@ pub enum Action {
     Read(Item, u16),
     /// Send all unacknowledged steps again now.
     Resend,
+    /// Let other devices pair by Bluetooth for so long. Only over the serial line: who has it has the shoe at hand.
+    /// **Units:** s.
+    Pair(u16),
 }
 
 /// The one answer to a command.
@@ -317,4 +320,6 @@ pub enum Refusal {
     Checksum,
     /// The bytes are no such value of this version, or its numbers make no sense.
     Value,
+    /// Not by this way: only over the serial line.
+    Port,
 }

@@ -1,7 +1,8 @@
 //! The wire between shoe and laptop: every message once, its bytes, and what makes sure that each step arrives.
 //!
 //! A [`message`] is a postcard value with a checksum in a [`frame`]. A finished step is packed into 40 bytes
-//! ([`packed`]), kept in the [`outbox`] of the shoe (in half as many) until the laptop has acknowledged it, and put in order by the laptop's
+//! ([`packed`]), kept in the [`outbox`] of the shoe (in half as many) until the laptop of each [`port`] has acknowledged it,
+//! and put in order by the laptop's
 //! [`inbox`]. [`link`] is the shoe's whole end of the wire; the laptop's is in the `sohle` crate. Parameters and calibration,
 //! which are too long for a message, go in pieces ([`transfer`]).
 //!
@@ -9,15 +10,20 @@
 //! compiled from different ones.
 
 pub mod bluetooth;
+mod desk;
 mod difference;
 pub mod frame;
 #[cfg(test)]
 mod golden;
 pub mod inbox;
+mod lane;
+#[cfg(test)]
+mod laws;
 pub mod link;
 pub mod message;
 pub mod outbox;
 pub mod packed;
+pub mod port;
 mod shelf;
 pub mod transfer;
 

@@ -1,4 +1,4 @@
-//! Steps that wait on the shoe until the laptop has them.
+//! Steps that wait on the shoe until the laptops have them.
 //!
 //! Selective repeat: up to [`WINDOW`] steps are under way at a time; the laptop tells which of them have come, and those
 //! that have not are sent again when their time is over, or at once when a step sent later has come before them. While
@@ -6,13 +6,15 @@
 //! a bounded pace. When there is no room, the oldest step gives way and is counted; the laptop learns it from the number of
 //! the oldest step kept.
 //!
-//! What waits is kept as the difference of each step to the one before, in half the bytes that are sent of it.
+//! Each [`Port`] has a laptop of its own, which neither hurries nor delays that of another. A step is kept until it was
+//! acknowledged by all laptops that have greeted, except for those not heard for [`Pace::patience_us`], and by at least one.
 //!
-//! # Source
-//! The waiting time is that of RFC 6298 (sections 2 and 3: smoothed round-trip time, none from a step sent twice).
+//! What waits is kept as the difference of each step to the one before, in half the bytes that are sent of it.
 
+use super::lane::Lane;
 use super::message::{Ack, SentStep};
 use super::packed::PackedStep;
+use super::port::Port;
 use super::shelf::Shelf;
 use crate::time::Micros;
 
@@ -34,11 +36,14 @@ pub struct Pace {
     pub silence_us: i64,
     /// Longest time between two tries while it is gone; they begin at `first_timeout_us`.
     pub longest_probe_us: i64,
+    /// When nothing was heard for so long, nothing is kept any more for a laptop that another one has got already.
+    pub patience_us: i64,
 }
 
 impl Pace {
     /// For a serial line: 200 steps in a second are 12 % of 921 600 baud, so waiting ever longer would spare nothing. A
-    /// round trip takes 20 ms or less, and where only a few frames come whole, each try counts.
+    /// round trip takes 20 ms or less, and where only a few frames come whole, each try counts. Steps are kept for a laptop
+    /// for a quarter of an hour, in which one who walks makes as many as there is room for.
     pub const SERIAL: Self = Self {
         spacing_us: 5_000,
         first_timeout_us: 100_000,
@@ -46,6 +51,29 @@ impl Pace {
         longest_timeout_us: 100_000,
         silence_us: 3_000_000,
         longest_probe_us: 8_000_000,
+        patience_us: 900_000_000,
+    };
+
+    /// For Bluetooth, whose link layer itself repeats what was lost and keeps the order: a step is missing only when the
+    /// connection broke. A round trip takes two connection intervals and more while the radio is disturbed.
+    pub const RADIO: Self = Self {
+        first_timeout_us: 1_000_000,
+        shortest_timeout_us: 500_000,
+        longest_timeout_us: 2_000_000,
+        ..Self::SERIAL
+    };
+}
+
+impl Pace {
+    /// Zeros.
+    const NONE: Self = Self {
+        spacing_us: 0,
+        first_timeout_us: 0,
+        shortest_timeout_us: 0,
+        longest_timeout_us: 0,
+        silence_us: 0,
+        longest_probe_us: 0,
+        patience_us: 0,
     };
 }
 
@@ -55,93 +83,40 @@ impl Default for Pace {
     }
 }
 
-/// What is known of a step under way.
-#[derive(Clone, Copy, Debug)]
-struct Flight {
-    /// How often it was sent.
-    times: u8,
-    arrived: bool,
-    /// When it was sent last.
-    sent: Micros,
-    /// After so long it is sent again. **Units:** microseconds; the longest waiting time is a few seconds.
-    wait_us: u32,
-}
-
-impl Flight {
-    const NONE: Self = Self { times: 0, arrived: false, sent: Micros(0), wait_us: 0 };
-
-    /// When it is sent again.
-    fn due(&self) -> Micros {
-        self.sent + i64::from(self.wait_us)
-    }
-
-    /// It is sent again no later than `now`.
-    fn hurry(&mut self, now: Micros) {
-        self.wait_us = self.wait_us.min(whole(now - self.sent));
-    }
-}
-
-/// A time that is neither negative nor an hour long.
-fn whole(time_us: i64) -> u32 {
-    time_us.clamp(0, i64::from(u32::MAX)) as u32
-}
-
-/// The steps that the laptop may not have yet. There is room for `N` as they usually are, for more when they are small and for
-/// fewer when they are unlike each other.
+/// The steps that a laptop may not have yet, for `PORTS` laptops. There is room for `N` as they usually are, for more when
+/// they are small and for fewer when they are unlike each other.
 #[derive(Clone, Debug)]
-pub struct Outbox<const N: usize> {
-    pace: Pace,
+pub struct Outbox<const N: usize, const PORTS: usize = 1> {
     boot: u32,
     steps: Shelf<N>,
     /// Number of the oldest.
     oldest: u32,
-    /// By the number of the step, modulo [`WINDOW`].
-    flights: [Flight; WINDOW],
-    /// Smoothed round-trip time and its variation.
-    round_trip: Option<(i64, i64)>,
-    /// No step is sent before.
-    quiet_until: Micros,
-    heard: Micros,
-    /// Between two tries while nothing is heard.
-    probe_us: i64,
-    resent: u32,
-    dropped: u32,
+    lanes: [Lane; PORTS],
 }
 
-impl<const N: usize> Outbox<N> {
+impl<const N: usize, const PORTS: usize> Outbox<N, PORTS> {
     /// Empty. `boot` goes out with each step.
     pub const fn new(boot: u32, pace: Pace) -> Self {
-        Self {
-            pace,
-            boot,
-            steps: Shelf::new(),
-            oldest: 0,
-            flights: [Flight::NONE; WINDOW],
-            round_trip: None,
-            quiet_until: Micros(0),
-            heard: Micros(0),
-            probe_us: pace.first_timeout_us,
-            resent: 0,
-            dropped: 0,
-        }
+        Self { boot, steps: Shelf::new(), oldest: 0, lanes: [Lane::new(pace); PORTS] }
     }
 
     /// Empty, and nothing but zeros, so that a static takes no flash; [`Outbox::begin`] comes before anything else.
     pub const fn blank() -> Self {
-        let none = Pace {
-            spacing_us: 0,
-            first_timeout_us: 0,
-            shortest_timeout_us: 0,
-            longest_timeout_us: 0,
-            silence_us: 0,
-            longest_probe_us: 0,
-        };
-        Self::new(0, none)
+        Self::new(0, Pace::NONE)
     }
 
-    /// Sends at this pace from now on.
-    pub fn begin(&mut self, pace: Pace) {
-        (self.pace, self.probe_us) = (pace, pace.first_timeout_us);
+    /// Sends at this pace to the laptop of this port from now on.
+    pub fn begin(&mut self, port: Port, pace: Pace) {
+        let lane = self.lane_mut(port);
+        (lane.pace, lane.probe_us) = (pace, pace.first_timeout_us);
+    }
+
+    fn lane(&self, port: Port) -> &Lane {
+        &self.lanes[port.index()]
+    }
+
+    fn lane_mut(&mut self, port: Port) -> &mut Lane {
+        &mut self.lanes[port.index()]
     }
 
     /// The boot that the steps belong to from now on: it is not known yet when an empty outbox is made at compile time.
@@ -153,15 +128,21 @@ impl<const N: usize> Outbox<N> {
     pub fn push(&mut self, step: PackedStep) {
         while !self.steps.fits(&step) {
             self.forget_oldest();
-            self.dropped = self.dropped.saturating_add(1);
+            for lane in &mut self.lanes {
+                lane.dropped = lane.dropped.saturating_add(lane.give_up_before(self.oldest));
+            }
         }
         self.steps.push(&step);
     }
 
     fn forget_oldest(&mut self) {
-        self.flights[self.oldest as usize % WINDOW] = Flight::NONE;
         self.oldest = self.oldest.wrapping_add(1);
         self.steps.pop();
+    }
+
+    /// Number of the step to come.
+    fn end(&self) -> u32 {
+        self.oldest.wrapping_add(self.len() as u32)
     }
 
     /// Steps kept.
@@ -169,143 +150,86 @@ impl<const N: usize> Outbox<N> {
         self.steps.len()
     }
 
-    /// Whether the laptop has every step.
+    /// Whether no step is kept.
     pub fn is_empty(&self) -> bool {
         self.steps.len() == 0
     }
 
-    /// Steps sent again so far.
-    pub fn resent(&self) -> u32 {
-        self.resent
+    /// Steps that the laptop of this port may not have.
+    pub fn waiting(&self, port: Port) -> usize {
+        self.lane(port).waiting(self.end())
     }
 
-    /// Steps that gave way to newer ones so far.
-    pub fn dropped(&self) -> u32 {
-        self.dropped
+    /// Steps sent to it again so far.
+    pub fn resent(&self, port: Port) -> u32 {
+        self.lane(port).resent
+    }
+
+    /// Steps that gave way to newer ones before it had them.
+    pub fn dropped(&self, port: Port) -> u32 {
+        self.lane(port).dropped
     }
 
     /// Something came from the laptop. When it had been gone, all that waits is due again.
-    pub fn hear(&mut self, now: Micros) {
-        if self.is_silent(now) {
-            self.resend_all(now);
-        }
-        self.heard = now;
-        self.probe_us = self.pace.first_timeout_us;
+    pub fn hear(&mut self, port: Port, now: Micros) {
+        self.lane_mut(port).hear(now);
     }
 
     /// Everything that is under way is due again.
-    pub fn resend_all(&mut self, now: Micros) {
-        for flight in self.flights.iter_mut().filter(|flight| flight.times > 0 && !flight.arrived) {
-            flight.hurry(now);
-        }
+    pub fn resend_all(&mut self, port: Port, now: Micros) {
+        self.lane_mut(port).resend_all(now);
     }
 
     /// Another program listens: it does not have what came to the one before it ahead of the oldest, so that is due too.
-    pub fn start_over(&mut self, now: Micros) {
-        self.flights.iter_mut().for_each(|flight| flight.arrived = false);
-        self.resend_all(now);
+    pub fn start_over(&mut self, port: Port, now: Micros) {
+        self.lane_mut(port).start_over(now);
     }
 
-    fn is_silent(&self, now: Micros) -> bool {
-        now - self.heard > self.pace.silence_us
+    /// Who is there does not understand steps: none are kept for it.
+    pub fn disengage(&mut self, port: Port) {
+        self.lane_mut(port).disengage();
+    }
+
+    /// Whether nothing was heard of the laptop for [`Pace::silence_us`].
+    pub fn is_silent(&self, port: Port, now: Micros) -> bool {
+        self.lane(port).is_silent(now)
     }
 
     /// Takes in what has arrived. An acknowledgement of steps that were never kept changes nothing.
-    pub fn acknowledge(&mut self, ack: &Ack, now: Micros) {
-        let before_next = ack.next.wrapping_sub(self.oldest) as i32;
-        if before_next > self.len() as i32 {
-            return;
-        }
-        let mut latest_sent = None;
-        for id in (self.oldest..).take(before_next.max(0) as usize) {
-            latest_sent = latest_sent.max(self.arrive(id, now));
+    pub fn acknowledge(&mut self, port: Port, ack: &Ack, now: Micros) {
+        let end = self.end();
+        self.lane_mut(port).acknowledge(ack, end, now);
+        self.release(now);
+    }
+
+    /// Lets go of what nobody waits for.
+    fn release(&mut self, now: Micros) {
+        let oldest = self.oldest;
+        let has = |lane: &Lane| lane.next.wrapping_sub(oldest);
+        let one = self.lanes.iter().map(has).max().unwrap_or(0);
+        let all = self.lanes.iter().filter(|lane| lane.counts(now)).map(has).min().unwrap_or(one);
+        for _ in 0..all.min(one) {
             self.forget_oldest();
         }
-        for bit in (0..64).filter(|bit| ack.later >> bit & 1 == 1) {
-            let id = ack.next.wrapping_add(1 + bit);
-            if (id.wrapping_sub(self.oldest) as usize) < self.len().min(WINDOW) {
-                latest_sent = latest_sent.max(self.arrive(id, now));
-            }
+        for lane in &mut self.lanes {
+            lane.give_up_before(self.oldest);
         }
-        // What was sent before a step that has come, and has not come itself, is probably lost.
-        if let Some(latest) = latest_sent {
-            for flight in self.flights.iter_mut() {
-                if flight.times > 0 && !flight.arrived && flight.sent < latest {
-                    flight.hurry(now);
-                }
-            }
-        }
-    }
-
-    /// Marks a step as arrived; the time it was sent, if that is news.
-    fn arrive(&mut self, id: u32, now: Micros) -> Option<Micros> {
-        let flight = &mut self.flights[id as usize % WINDOW];
-        if flight.times == 0 || flight.arrived {
-            return None;
-        }
-        flight.arrived = true;
-        let sent = flight.sent;
-        if flight.times == 1 {
-            let measured = (now - sent).max(0);
-            self.round_trip = Some(match self.round_trip {
-                None => (measured, measured / 2),
-                Some((mean, variation)) => {
-                    (mean + (measured - mean) / 8, variation + ((measured - mean).abs() - variation) / 4)
-                }
-            });
-        }
-        Some(sent)
-    }
-
-    /// How long a step that was sent so often waits for its acknowledgement.
-    fn timeout(&self, times: u8) -> i64 {
-        let first = match self.round_trip {
-            None => self.pace.first_timeout_us,
-            Some((mean, variation)) => mean + 4 * variation,
-        };
-        let doubled = first.max(self.pace.shortest_timeout_us) << times.saturating_sub(1).min(4);
-        doubled.min(self.pace.longest_timeout_us)
     }
 
     /// The step that is to be sent now, if one is.
-    pub fn next(&mut self, now: Micros) -> Option<SentStep> {
-        if now < self.quiet_until {
-            return None;
-        }
-        let (offset, due) = self.first_due(now)?;
-        if due > now {
-            return None;
-        }
-        let step = self.steps.get(offset)?;
-        let id = self.oldest.wrapping_add(offset as u32);
-        let times = self.flights[id as usize % WINDOW].times.saturating_add(1);
-        self.resent = self.resent.saturating_add(u32::from(times > 1));
-        let wait = if self.is_silent(now) {
-            let wait = self.probe_us;
-            self.probe_us = (wait * 2).min(self.pace.longest_probe_us);
-            wait
-        } else {
-            self.timeout(times)
-        };
-        self.flights[id as usize % WINDOW] = Flight { times, arrived: false, sent: now, wait_us: whole(wait) };
-        self.quiet_until = now + self.pace.spacing_us;
-        Some(SentStep { boot: self.boot, id, oldest: self.oldest, step })
+    pub fn next(&mut self, port: Port, now: Micros) -> Option<SentStep> {
+        let end = self.end();
+        let id = self.lane(port).due(end, now)?;
+        let step = self.steps.get(id.wrapping_sub(self.oldest) as usize)?;
+        let lane = self.lane_mut(port);
+        lane.sent(id, now);
+        let oldest = lane.next;
+        Some(SentStep { boot: self.boot, id, oldest, step })
     }
 
     /// When [`Outbox::next`] should be asked again; `None` when only a new step or the laptop can change anything.
-    pub fn deadline(&self, now: Micros) -> Option<Micros> {
-        self.first_due(now).map(|(_, due)| due.max(self.quiet_until))
-    }
-
-    /// Place after the oldest, and time, of what is to be sent next.
-    fn first_due(&self, now: Micros) -> Option<(usize, Micros)> {
-        let mut under_way = (0..self.len().min(WINDOW)).filter_map(|offset| {
-            let flight = &self.flights[self.oldest.wrapping_add(offset as u32) as usize % WINDOW];
-            let due = if flight.times == 0 { now } else { flight.due().max(now) };
-            (!flight.arrived).then_some((offset, due))
-        });
-        // Of several that are due, the oldest: others wait for it.
-        if self.is_silent(now) { under_way.next() } else { under_way.min_by_key(|&(_, due)| due) }
+    pub fn deadline(&self, port: Port, now: Micros) -> Option<Micros> {
+        self.lane(port).deadline(self.end(), now)
     }
 }
 
@@ -324,7 +248,7 @@ mod tests {
 
     fn filled<const N: usize>(count: u32) -> Outbox<N> {
         let mut outbox = Outbox::new(BOOT, Pace::default());
-        outbox.hear(Micros(0));
+        outbox.hear(Port::Serial, Micros(0));
         (0..count).for_each(|index| outbox.push(step(index)));
         outbox
     }
@@ -332,9 +256,9 @@ mod tests {
     /// What goes out until `end`: time in milliseconds and number. Asks only when told to.
     fn sent<const N: usize>(outbox: &mut Outbox<N>, now: &mut Micros, end: Micros) -> Vec<(i64, u32)> {
         let mut sent = Vec::new();
-        while let Some(due) = outbox.deadline(*now).filter(|&due| due < end) {
+        while let Some(due) = outbox.deadline(Port::Serial, *now).filter(|&due| due < end) {
             *now = due.max(*now);
-            sent.extend(outbox.next(*now).map(|sent| (now.0 / 1_000, sent.id)));
+            sent.extend(outbox.next(Port::Serial, *now).map(|sent| (now.0 / 1_000, sent.id)));
         }
         *now = end;
         sent
@@ -349,10 +273,10 @@ mod tests {
         let mut outbox = filled::<8>(3);
         let mut now = Micros(0);
         assert_eq!(sent(&mut outbox, &mut now, Micros(100_000)), [(0, 0), (5, 1), (10, 2)]);
-        outbox.acknowledge(&ack(3, 0), now);
+        outbox.acknowledge(Port::Serial, &ack(3, 0), now);
         assert!(outbox.is_empty());
-        assert_eq!(outbox.deadline(now), None);
-        assert_eq!((outbox.resent(), outbox.dropped()), (0, 0));
+        assert_eq!(outbox.deadline(Port::Serial, now), None);
+        assert_eq!((outbox.resent(Port::Serial), outbox.dropped(Port::Serial)), (0, 0));
     }
 
     #[test]
@@ -361,9 +285,9 @@ mod tests {
         let mut now = Micros(0);
         sent(&mut outbox, &mut now, Micros(30_000));
         // 0, 2 and 3 have come.
-        outbox.acknowledge(&ack(1, 0b11), now);
+        outbox.acknowledge(Port::Serial, &ack(1, 0b11), now);
         assert_eq!(sent(&mut outbox, &mut now, Micros(60_000)), [(30, 1)]);
-        outbox.acknowledge(&ack(4, 0), now);
+        outbox.acknowledge(Port::Serial, &ack(4, 0), now);
         assert!(outbox.is_empty());
     }
 
@@ -373,21 +297,21 @@ mod tests {
         let mut now = Micros(0);
         sent(&mut outbox, &mut now, Micros(30_000));
         // 1 and 2 have come.
-        outbox.acknowledge(&ack(0, 0b11), now);
-        outbox.start_over(now);
+        outbox.acknowledge(Port::Serial, &ack(0, 0b11), now);
+        outbox.start_over(Port::Serial, now);
         assert_eq!(sent(&mut outbox, &mut now, Micros(60_000)), [(30, 0), (35, 1), (40, 2)]);
     }
 
     #[test]
     fn unanswered_steps_wait_twice_as_long_each_time() {
         let mut outbox = filled::<8>(1);
-        outbox.begin(Pace { first_timeout_us: 250_000, longest_timeout_us: 1_000_000, ..Pace::default() });
+        outbox.begin(Port::Serial, Pace { first_timeout_us: 250_000, longest_timeout_us: 1_000_000, ..Pace::default() });
         let mut now = Micros(0);
         assert_eq!(
             sent(&mut outbox, &mut now, Micros(2_900_000)),
             [(0, 0), (250, 0), (750, 0), (1_750, 0), (2_750, 0)]
         );
-        assert_eq!(outbox.resent(), 4);
+        assert_eq!(outbox.resent(Port::Serial), 4);
     }
 
     #[test]
@@ -397,9 +321,9 @@ mod tests {
         assert_eq!(sent(&mut outbox, &mut now, Micros(350_000)), [(0, 0), (100, 0), (200, 0), (300, 0)]);
         outbox.push(step(1));
         now = Micros(360_000);
-        outbox.acknowledge(&ack(1, 0), now);
+        outbox.acknowledge(Port::Serial, &ack(1, 0), now);
         sent(&mut outbox, &mut now, Micros(361_000));
-        outbox.acknowledge(&ack(2, 0), Micros(365_000));
+        outbox.acknowledge(Port::Serial, &ack(2, 0), Micros(365_000));
         // A round trip was measured.
         outbox.push(step(2));
         assert_eq!(sent(&mut outbox, &mut now, Micros(700_000)), [(365, 2), (415, 2), (515, 2), (615, 2)]);
@@ -420,18 +344,18 @@ mod tests {
     fn after_the_silence_everything_follows_at_the_pace() {
         let mut outbox = filled::<2_000>(1_000);
         let mut now = Micros(600_000_000);
-        outbox.next(now);
-        outbox.hear(now);
+        outbox.next(Port::Serial, now);
+        outbox.hear(Port::Serial, now);
         let mut last = now;
         let mut arrived = 0;
         while !outbox.is_empty() {
-            now = outbox.deadline(now).unwrap().max(now);
-            let sent = outbox.next(now).unwrap();
+            now = outbox.deadline(Port::Serial, now).unwrap().max(now);
+            let sent = outbox.next(Port::Serial, now).unwrap();
             assert!(now == last || now - last >= 5_000);
             last = now;
             assert_eq!(sent.id, arrived);
             arrived += 1;
-            outbox.acknowledge(&ack(arrived, 0), now + 1_000);
+            outbox.acknowledge(Port::Serial, &ack(arrived, 0), now + 1_000);
         }
         assert_eq!(arrived, 1_000);
         assert!((now.0 - 600_000_000) < 6_000_000, "1000 steps at 200 in a second");
@@ -440,9 +364,9 @@ mod tests {
     #[test]
     fn a_full_outbox_gives_up_the_oldest_and_tells() {
         let mut outbox = filled::<4>(60);
-        let dropped = outbox.dropped();
+        let dropped = outbox.dropped(Port::Serial);
         assert!(dropped > 40 && outbox.len() as u32 + dropped == 60);
-        let sent = outbox.next(Micros(0)).unwrap();
+        let sent = outbox.next(Port::Serial, Micros(0)).unwrap();
         assert_eq!((sent.oldest, sent.id, sent.step.unpack().index), (dropped, dropped, dropped));
     }
 
@@ -452,11 +376,11 @@ mod tests {
         let mut now = Micros(0);
         sent(&mut outbox, &mut now, Micros(20_000));
         for next in [3, 1_000, u32::MAX / 2] {
-            outbox.acknowledge(&ack(next, u64::MAX), now);
+            outbox.acknowledge(Port::Serial, &ack(next, u64::MAX), now);
             assert_eq!(outbox.len(), 2);
         }
-        outbox.acknowledge(&ack(1, 0), now);
-        outbox.acknowledge(&ack(0, 0), now);
+        outbox.acknowledge(Port::Serial, &ack(1, 0), now);
+        outbox.acknowledge(Port::Serial, &ack(0, 0), now);
         assert_eq!(outbox.len(), 1);
     }
 
@@ -474,17 +398,17 @@ mod tests {
                         outbox.push(step(pushed));
                         pushed += 1;
                     }
-                    1 => outbox.hear(now),
-                    2 => outbox.acknowledge(&ack(if next % 4 == 0 { next } else { next % 64 }, later), now),
+                    1 => outbox.hear(Port::Serial, now),
+                    2 => outbox.acknowledge(Port::Serial, &ack(if next % 4 == 0 { next } else { next % 64 }, later), now),
                     _ => {
-                        if let Some(sent) = outbox.next(now) {
+                        if let Some(sent) = outbox.next(Port::Serial, now) {
                             prop_assert!(sent.id < pushed && sent.oldest <= sent.id);
                             prop_assert_eq!(sent.step.unpack().index, sent.id);
                             prop_assert_eq!(sent.oldest + outbox.len() as u32, pushed);
                         }
                     }
                 }
-                prop_assert!(outbox.len() as u32 + outbox.dropped() <= pushed);
+                prop_assert!(outbox.len() as u32 + outbox.dropped(Port::Serial) <= pushed);
             }
         }
     }
