@@ -11,8 +11,8 @@ use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::frame::FRAME_MAX;
 use sohle_shared::wire::link::{Identity, Link};
 use sohle_shared::wire::outbox::{Outbox, Pace};
-use sohle_shared::wire::port::Port;
 use sohle_shared::wire::packed::PackedStep;
+use sohle_shared::wire::port::Port;
 use std::collections::VecDeque;
 
 /// Steps that the shoe has room for.
@@ -198,8 +198,15 @@ pub fn run(data: &[u8]) {
         }
         stage.turn();
     }
-    assert_eq!((stage.link.waiting(Port::Serial), stage.next.unwrap_or(0)), (0, stage.made), "all have come on a clean line");
-    assert!(stage.dropped <= stage.link.counters(Port::Serial).steps_dropped, "only what the shoe had no room for is missing");
+    assert_eq!(
+        (stage.link.waiting(Port::Serial), stage.next.unwrap_or(0)),
+        (0, stage.made),
+        "all have come on a clean line"
+    );
+    assert!(
+        stage.dropped <= stage.link.counters(Port::Serial).steps_dropped,
+        "only what the shoe had no room for is missing"
+    );
 }
 
 /// A good line, one of each fault, and more steps than there is room for.

@@ -98,7 +98,11 @@ fn run(walk: &Walk, sleep_after_s: f32, says: impl Fn(i64) -> Option<Action>) ->
     let mut shoe = Shoe::new(identity, &Config::default(), &parameters, &Calibration::default(), outbox);
     let hello = LaptopHello { protocol: PROTOCOL, schema: SCHEMA, session: 1, software: text("test") };
     let hear = |shoe: &mut Shoe<256>, message, now| {
-        shoe.received(Port::Serial, encode(&message, &mut [0; FRAME_MAX]).expect("every message fits into a frame"), now);
+        shoe.received(
+            Port::Serial,
+            encode(&message, &mut [0; FRAME_MAX]).expect("every message fits into a frame"),
+            now,
+        );
     };
     hear(&mut shoe, ToShoe::Hello(hello), Micros(0));
 

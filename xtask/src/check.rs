@@ -8,8 +8,13 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Every workspace of the checkout: each has a lock file of its own.
-pub const MANIFESTS: [&str; 4] =
-    ["Cargo.toml", "firmware/emulator/Cargo.toml", "firmware/shoe/Cargo.toml", "fuzz/Cargo.toml"];
+pub const MANIFESTS: [&str; 5] = [
+    "Cargo.toml",
+    "firmware/ble/Cargo.toml",
+    "firmware/emulator/Cargo.toml",
+    "firmware/shoe/Cargo.toml",
+    "fuzz/Cargo.toml",
+];
 
 /// The largest file a commit may hold. **Units:** bytes.
 const LARGEST_FILE: u64 = 1_000_000;

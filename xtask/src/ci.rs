@@ -5,6 +5,9 @@ use crate::stage::{Run, Tally};
 use crate::{bench, check, determinism, device, emulate, emulator, firmware, fuzz, tools, window};
 use std::process::Command;
 
+/// The shoe's Bluetooth, which no workspace has: it is built for the host here, and with the firmware for the boards.
+const BLUETOOTH: &str = "--manifest-path firmware/ble/Cargo.toml --target-dir target";
+
 /// How to run the checks.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -32,6 +35,10 @@ pub fn run(arguments: &Arguments) -> bool {
     });
     run.stage("tests", tests);
     run.stage("documentation tests", || counted(cargo("test --locked --workspace --all-features --doc")));
+    run.check("Bluetooth lint", || {
+        process::run(&mut cargo(&format!("clippy --locked {BLUETOOTH} --all-targets -- -D warnings")))
+    });
+    run.stage("Bluetooth tests", || counted(cargo(&format!("test --locked {BLUETOOTH}"))));
     run.check("fuzz lint", || {
         // With the folder of the others, most of it is built already.
         process::run(&mut cargo(

@@ -2,7 +2,7 @@
 
 mod proxy;
 
-use crate::firmware::{self, Budget};
+use crate::firmware::{self, Budgets};
 use crate::process::{self, Failure};
 use crate::{device, in_root, tools};
 use proxy::Proxy;
@@ -212,7 +212,7 @@ pub fn check() -> Result<(), Failure> {
 /// All that the shoe needs of the RAM, against its budget. What the twin and the walk keep is left out, since no board has
 /// either; the stack below the twin's driver is not. It holds the shoe itself, as on the boards.
 fn within_budget(statics: u64, stack: u32) -> Result<(), Failure> {
-    let (ram, budget) = (statics + u64::from(stack), Budget::read()?.ram);
+    let (ram, budget) = (statics + u64::from(stack), Budgets::read()?.wired.ram);
     let told = format!("{statics} bytes of statics and {stack} of stack are {ram} of RAM, of {budget}");
     println!("  {told}");
     if stack > 0 && ram <= budget { Ok(()) } else { Err(Failure::Found(told)) }

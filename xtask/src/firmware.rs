@@ -16,6 +16,9 @@ use std::process::Command;
 /// Where the firmware is.
 const FOLDER: &str = "firmware/shoe";
 
+/// Its program.
+const SHOE: &str = "shoe";
+
 /// Everything from here on is RAM, everything below flash (ARMv7-M Architecture Reference Manual, B3.1).
 const RAM: u64 = 0x2000_0000;
 
@@ -32,11 +35,13 @@ impl Board {
     /// All of them.
     const ALL: [Self; 2] = [Self::Wb55, Self::F405];
 
-    fn feature(self) -> &'static str {
-        match self {
+    /// As cargo takes them.
+    fn features(self, ble: bool) -> String {
+        let board = match self {
             Self::Wb55 => "board-wb55",
             Self::F405 => "board-f405",
-        }
+        };
+        format!("{board}{}", if ble { ",ble" } else { "" })
     }
 
     /// As probe-rs calls it.
@@ -77,6 +82,9 @@ pub struct FlashArguments {
     /// The program: `shoe`, or one of `bringup_spi`, `bringup_fifo`, `bringup_uart`.
     #[arg(long, default_value = "shoe")]
     bin: String,
+    /// With Bluetooth, by a module at the second serial line.
+    #[arg(long)]
+    ble: bool,
 }
 
 /// The most that the firmware may take. **Units:** bytes.
@@ -89,10 +97,20 @@ pub struct Budget {
     pub ram: u64,
 }
 
-impl Budget {
-    /// That of the repository.
+/// The budgets without and with Bluetooth.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Budgets {
+    /// A shoe with its serial line alone.
+    pub wired: Budget,
+    /// One with Bluetooth beside it.
+    pub ble: Budget,
+}
+
+impl Budgets {
+    /// Those of the repository.
     pub fn read() -> Result<Self, Failure> {
-        read_budget(&in_root("firmware/budget.toml"))
+        read_budgets(&in_root("firmware/budget.toml"))
     }
 }
 
@@ -118,30 +136,37 @@ impl Size {
     }
 }
 
-/// Builds all programs for the boards and holds `shoe` against the budget.
+/// Builds all programs for the boards, `shoe` without and with Bluetooth, and holds it against its budgets.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let boards = match arguments.board {
         Boards::All => &Board::ALL[..],
         Boards::Wb55 => &[Board::Wb55],
         Boards::F405 => &[Board::F405],
     };
-    let budget = Budget::read()?;
+    let budgets = Budgets::read()?;
     let mut objections = Vec::new();
     let mut rows = Vec::new();
     for &board in boards {
-        build(board)?;
-        for name in programs()? {
-            let elf = device::binary(&name);
+        let mut measure = |binary: &str, name: &str, budget: Option<Budget>| {
+            let elf = device::binary(binary);
             let size = size(&read(&elf)?).map_err(|trouble| Failure::Found(format!("{}: {trouble}", elf.display())))?;
-            if name == "shoe" {
-                objections.extend(size.objection(budget).map(|over| format!("{} for {board:?}: {over}", name)));
-            }
-            rows.push(row(&format!("{board:?}"), &name, [size.flash, size.statics, size.stack, size.ram()]));
+            let over = budget.and_then(|budget| size.objection(budget));
+            objections.extend(over.map(|over| format!("{name} for {board:?}: {over}")));
+            rows.push(row(&format!("{board:?}"), name, [size.flash, size.statics, size.stack, size.ram()]));
+            Ok::<_, Failure>(())
+        };
+        build(board, false, &["--bins"])?;
+        for name in programs()? {
+            measure(&name, &name, (name == SHOE).then_some(budgets.wired))?;
         }
+        build(board, true, &["--bin", SHOE])?;
+        measure(SHOE, "shoe, ble", Some(budgets.ble))?;
     }
     println!("{:<6} {:<14} {:>9} {:>9} {:>9} {:>9}", "board", "bytes", "flash", "statics", "stack", "RAM");
     rows.iter().for_each(|row| println!("{row}"));
-    println!("{:<6} {:<14} {:>9} {:>9} {:>9} {:>9}", "", "budget, shoe", budget.flash, budget.statics, "", budget.ram);
+    for (name, budget) in [("budget, shoe", budgets.wired), ("budget, ble", budgets.ble)] {
+        println!("{:<6} {name:<14} {:>9} {:>9} {:>9} {:>9}", "", budget.flash, budget.statics, "", budget.ram);
+    }
     println!("the stack is what the memory map reserves; how deep it goes, `cargo xtask emulate --check` measures");
     if objections.is_empty() { Ok(()) } else { Err(Failure::Found(objections.join("; "))) }
 }
@@ -161,24 +186,27 @@ pub fn flash(arguments: &FlashArguments) -> Result<(), Failure> {
         let how = "cargo install --locked probe-rs-tools (https://probe.rs)";
         return Err(Failure::Missing { what: "probe-rs, which writes the flash".into(), how: how.into() });
     }
-    build(arguments.board)?;
+    if arguments.ble && arguments.bin != SHOE {
+        return Err(Failure::Found(format!("only `{SHOE}` has Bluetooth, `{}` does not", arguments.bin)));
+    }
+    build(arguments.board, arguments.ble, &["--bin", &arguments.bin])?;
     let mut command = Command::new("probe-rs");
     process::run(command.args(["run", "--chip", arguments.board.chip()]).arg(device::binary(&arguments.bin)))
 }
 
-fn build(board: Board) -> Result<(), Failure> {
+fn build(board: Board, ble: bool, what: &[&str]) -> Result<(), Failure> {
     let mut command = Route::find()?.build(&in_root(FOLDER));
-    process::run(command.args(["--bins", "--features", board.feature()]))
+    process::run(command.args(what).args(["--features", &board.features(ble)]))
 }
 
-/// Lints the firmware for all boards, where there is a clippy for the target.
+/// Lints the firmware for all boards, without and with Bluetooth, where there is a clippy for the target.
 pub fn lint() -> Result<(), Failure> {
-    for board in Board::ALL {
+    for (board, ble) in Board::ALL.into_iter().flat_map(|board| [(board, false), (board, true)]) {
         let Some(mut command) = Route::find()?.clippy(&in_root(FOLDER)) else {
             println!("no clippy for {}: the firmware is not linted", device::TARGET);
             return Ok(());
         };
-        process::run(command.args(["--features", board.feature(), "--", "-D", "warnings"]))?;
+        process::run(command.args(["--features", &board.features(ble), "--", "-D", "warnings"]))?;
     }
     Ok(())
 }
@@ -193,7 +221,7 @@ fn programs() -> Result<Vec<String>, Failure> {
         names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
     }
     names.sort();
-    names.insert(0, "shoe".into());
+    names.insert(0, SHOE.into());
     Ok(names)
 }
 
@@ -201,7 +229,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).map_err(|source| Failure::File { path: path.display().to_string(), source })
 }
 
-fn read_budget(path: &Path) -> Result<Budget, Failure> {
+fn read_budgets(path: &Path) -> Result<Budgets, Failure> {
     let text = String::from_utf8_lossy(&read(path)?).into_owned();
     toml::from_str(&text)
         .map_err(|error| Failure::Found(format!("{}: {}", path.display(), error.message().replace('\n', " "))))
@@ -296,9 +324,11 @@ mod tests {
     }
 
     #[test]
-    fn the_budget_of_the_repository_is_read() {
-        let budget = read_budget(&in_root("firmware/budget.toml")).unwrap();
-        assert!(budget.flash > 0 && budget.statics > 0 && budget.statics < budget.ram);
+    fn the_budgets_of_the_repository_are_read() {
+        let Budgets { wired, ble } = read_budgets(&in_root("firmware/budget.toml")).unwrap();
+        for budget in [wired, ble] {
+            assert!(budget.flash > 0 && budget.statics > 0 && budget.statics < budget.ram);
+        }
     }
 
     #[test]

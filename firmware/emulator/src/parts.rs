@@ -21,6 +21,7 @@ use sohle_shared::wire::frame::{AnyDecoder, FRAME_MAX, encode};
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Ack, FromShoe, LaptopHello, ToShoe, text};
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::port::Port;
 use sohle_shared::wire::{PROTOCOL, SCHEMA};
 
 /// The native rate. **Units:** microseconds.
@@ -203,7 +204,7 @@ fn connected(config: &Config) -> Shoe<64> {
 fn hear(shoe: &mut Shoe<64>, message: &ToShoe, now: Micros) {
     let mut buffer = [0; FRAME_MAX];
     if let Ok(frame) = encode(message, &mut buffer) {
-        shoe.received(frame, now);
+        shoe.received(Port::Serial, frame, now);
     }
 }
 
@@ -213,7 +214,7 @@ fn speak(shoe: &mut Shoe<64>, now: Micros) -> u32 {
     let mut ticks = 0;
     loop {
         let before = mark();
-        let frame = shoe.transmit(now, &mut buffer);
+        let frame = shoe.transmit(Port::Serial, now, &mut buffer);
         ticks += before.ticks();
         let Some(mut frame) = frame else { return ticks };
         if let Some(Ok(FromShoe::Step(sent))) = AnyDecoder::new().next(&mut frame) {

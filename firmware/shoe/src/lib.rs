@@ -14,6 +14,8 @@ pub mod board;
 pub mod executor;
 mod fault;
 pub mod kept;
+#[cfg(feature = "ble")]
+pub mod radio;
 pub mod sensor;
 pub mod settings;
 pub mod stack;

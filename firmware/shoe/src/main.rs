@@ -13,11 +13,14 @@ use sohle_shared::shoe::Shoe;
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Level, Refusal, ResetReason};
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::port::Port;
 use sohle_shared::wire::transfer::Value;
 use sohle_shoe::board::{self, Sensor};
 use sohle_shoe::executor::{self, Load};
 use sohle_shoe::settings::Settings;
 use sohle_shoe::{kept, sensor, stack};
+#[cfg(not(feature = "ble"))]
+use sohle_tasks::NoAir;
 use sohle_tasks::{Board, BoardHealth, Traffic, now, process, send};
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -29,11 +32,14 @@ const RING: usize = 1_024;
 
 static TRAFFIC: Traffic = Traffic::new();
 
+/// Laptops at a time: one at the serial line, and one by Bluetooth.
+const PORTS: usize = if cfg!(feature = "ble") { 2 } else { 1 };
+
 /// 23 kB that are never on the stack.
-static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::blank());
+static OUTBOX: ConstStaticCell<Outbox<STEPS, PORTS>> = ConstStaticCell::new(Outbox::blank());
 
 /// The shoe with its steps elsewhere.
-type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS>>;
+type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS, PORTS>, PORTS>;
 
 /// What the loops need of the board.
 struct Machine {
@@ -48,6 +54,11 @@ impl Board for Machine {
         self.settings.keep(value)
     }
 
+    #[cfg(feature = "ble")]
+    async fn keep_bonds(&mut self, bonds: &sohle_shared::bonds::Bonds) -> Result<(), Refusal> {
+        self.settings.keep_bonds(bonds)
+    }
+
     fn health(&mut self) -> BoardHealth {
         BoardHealth { load: self.load.take(), battery: None, stack: stack::used(), reset: self.reset }
     }
@@ -59,7 +70,11 @@ impl Board for Machine {
 
 #[embassy_executor::task]
 async fn processing(shoe: &'static mut Wearer, line: RingBufferedUartRx<'static>, machine: Machine) {
-    process(&TRAFFIC, shoe, line, machine).await
+    #[cfg(not(feature = "ble"))]
+    let air = &NoAir;
+    #[cfg(feature = "ble")]
+    let air = &sohle_shoe::radio::RADIO;
+    process(&TRAFFIC, shoe, line, air, machine).await
 }
 
 #[embassy_executor::task]
@@ -72,6 +87,8 @@ struct Parts {
     sensor: Sensor,
     tx: UartTx<'static, Async>,
     rx: UartRx<'static, Async>,
+    #[cfg(feature = "ble")]
+    radio: board::Radio,
     machine: Machine,
     boot: u32,
 }
@@ -81,9 +98,18 @@ struct Parts {
 /// The board with its settings.
 #[inline(never)]
 fn begin() -> Parts {
-    let board::Board { sensor, tx, rx, flash, watchdog, reset, boot } = board::start();
+    let board = board::start();
+    let board::Board { sensor, tx, rx, flash, watchdog, reset, boot, .. } = board;
     let machine = Machine { settings: Settings::open(flash), watchdog, load: Load::start(), reset };
-    Parts { sensor, tx, rx, machine, boot }
+    Parts {
+        sensor,
+        tx,
+        rx,
+        #[cfg(feature = "ble")]
+        radio: board.radio,
+        machine,
+        boot,
+    }
 }
 
 /// A shoe. The compiler makes it where the caller wants it, and not a second one beside it.
@@ -91,7 +117,9 @@ fn begin() -> Parts {
 fn make(boot: u32, settings: &mut Settings) -> Wearer {
     let identity = Identity { boot, firmware: env!("CARGO_PKG_VERSION"), board: board::NAME };
     let outbox = OUTBOX.take();
-    outbox.begin(Pace::SERIAL);
+    outbox.begin(Port::Serial, Pace::SERIAL);
+    #[cfg(feature = "ble")]
+    outbox.begin(Port::Radio, Pace::RADIO);
     Shoe::new(identity, &Config::default(), &settings.parameters(), &settings.calibration(), outbox)
 }
 
@@ -99,6 +127,8 @@ fn make(boot: u32, settings: &mut Settings) -> Wearer {
 #[inline(never)]
 fn set_off(spawner: Spawner, parts: Parts, shoe: &'static mut Wearer) {
     static BUFFER: StaticCell<[u8; RING]> = StaticCell::new();
+    #[cfg(feature = "ble")]
+    let radio = parts.radio;
     let Parts { sensor, tx, rx, mut machine, .. } = parts;
     if let Some(words) = kept::take() {
         defmt::error!("before the reset: {=str}", words.as_str());
@@ -108,8 +138,13 @@ fn set_off(spawner: Spawner, parts: Parts, shoe: &'static mut Wearer) {
         shoe.log(now(), Level::Warn, "kept settings cannot be used: defaults are in effect");
     }
     let line = rx.into_ring_buffered(BUFFER.init([0; RING]));
+    #[cfg(feature = "ble")]
+    sohle_shoe::radio::start(spawner, radio, machine.settings.bonds());
     machine.watchdog.unleash();
     sensor::start(sensor, Config::default(), &TRAFFIC);
+    // Bluetooth has the thread for itself, which everything else interrupts.
+    #[cfg(feature = "ble")]
+    let spawner = board::steady();
     spawner.spawn(sending(tx).expect("one line"));
     spawner.spawn(processing(shoe, line, machine).expect("one shoe"));
 }

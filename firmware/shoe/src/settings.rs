@@ -3,6 +3,8 @@
 use crate::board::{self, Flash};
 use core::fmt;
 use embassy_futures::block_on;
+#[cfg(feature = "ble")]
+use sohle_shared::bonds::Bonds;
 use sohle_shared::calibration::Calibration;
 use sohle_shared::calibration::store::{Error, Store, Stored};
 use sohle_shared::tracker::Parameters;
@@ -50,6 +52,21 @@ impl Settings {
     /// Calibration in effect.
     pub fn calibration(&mut self) -> Calibration {
         self.load()
+    }
+
+    /// The devices that have paired.
+    #[cfg(feature = "ble")]
+    pub fn bonds(&mut self) -> Bonds {
+        self.load()
+    }
+
+    /// Keeps them.
+    #[cfg(feature = "ble")]
+    #[inline(never)]
+    pub fn keep_bonds(&mut self, bonds: &Bonds) -> Result<(), Refusal> {
+        let store = self.store.as_mut().ok_or(Refusal::Failed)?;
+        let result = block_on(store.save(bonds));
+        result.inspect_err(|error| tell("a pairing is not stored", error)).map_err(|_| Refusal::Failed)
     }
 
     #[inline(never)]

@@ -5,11 +5,13 @@
 //! line. A real board and the emulated one differ in what they give to these: bus, pins, serial line, flash and clock.
 #![no_std]
 
+mod air;
 mod process;
 mod queue;
 mod sense;
 mod traffic;
 
+pub use air::{Air, Happening, NoAir};
 pub use process::{Board, BoardHealth, process};
 pub use sense::sense;
 pub use traffic::{Traffic, send};

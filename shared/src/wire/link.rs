@@ -5,8 +5,8 @@
 //! carries out its [`Request`]s. Before a laptop with the same messages has said hello, nothing but hellos is sent. With two
 //! [`Port`]s there can be two laptops at a time, which know nothing of each other.
 
-use super::frame::{self, Decoder, FRAME_MAX};
 use super::desk::{CommandState, Desk, Peer};
+use super::frame::{self, Decoder, FRAME_MAX};
 use super::message::{Action, Command, FromShoe, Hello, LaptopHello, LinkCounters, Outcome, Refusal, ToShoe, text};
 use super::outbox::Outbox;
 use super::packed::PackedStep;
@@ -295,8 +295,8 @@ impl<const STEPS: usize, const PORTS: usize, O: BorrowMut<Outbox<STEPS, PORTS>>>
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::AnyDecoder;
     use super::super::desk::{HELLO_US, SAID_AGAIN_US};
+    use super::super::frame::AnyDecoder;
     use super::super::golden;
     use super::super::message::{Ack, TimeReply};
     use super::super::outbox::Pace;

@@ -305,7 +305,8 @@ mod tests {
     #[test]
     fn unanswered_steps_wait_twice_as_long_each_time() {
         let mut outbox = filled::<8>(1);
-        outbox.begin(Port::Serial, Pace { first_timeout_us: 250_000, longest_timeout_us: 1_000_000, ..Pace::default() });
+        outbox
+            .begin(Port::Serial, Pace { first_timeout_us: 250_000, longest_timeout_us: 1_000_000, ..Pace::default() });
         let mut now = Micros(0);
         assert_eq!(
             sent(&mut outbox, &mut now, Micros(2_900_000)),

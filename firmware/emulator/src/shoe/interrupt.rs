@@ -11,6 +11,9 @@ pub struct Irq(u16);
 impl Irq {
     /// A byte has come over the serial line.
     pub const UART_RECEIVED: Self = Self(0);
+    /// A byte has come from the Bluetooth controller.
+    #[cfg(feature = "ble")]
+    pub const HCI_RECEIVED: Self = Self(2);
     /// The timer of the alarms.
     pub const ALARM_TIMER: Self = Self(8);
     /// The free timer.
@@ -19,6 +22,10 @@ impl Irq {
     pub const SENSE: Self = Self(20);
     /// The same for the executor that does the rest.
     pub const PROCESS: Self = Self(21);
+
+    /// The same for the executor of Bluetooth.
+    #[cfg(feature = "ble")]
+    pub const RADIO: Self = Self(22);
 
     /// What the processor says of an interrupt; `None` for an exception.
     pub fn of(number: i16) -> Option<Self> {

@@ -3,11 +3,21 @@
 //! The sensor is its twin, which reads a recorded or simulated walk; driver, tracker and wire are those of the boards. The
 //! sensor is read at a higher priority than everything else runs at, as there. The serial line is whatever the emulator
 //! connects it to. Time is that of the emulated machine: with `-icount` it is real time for who watches.
+//!
+//! With the feature `ble` there is a second serial line, to a Bluetooth controller, and a flash in a file. The walk begins
+//! when the first laptop says something, whichever way it comes; without the feature the shoe walks at once, since the
+//! emulator itself waits for the laptop.
 #![no_std]
 #![no_main]
 
 mod clock;
+mod desk;
+#[cfg(feature = "ble")]
+mod flash;
 mod interrupt;
+mod memory;
+#[cfg(feature = "ble")]
+mod radio;
 mod sensor;
 #[path = "../stack.rs"]
 mod stack;
@@ -19,19 +29,21 @@ use cortex_m_semihosting::{debug, heprintln};
 use critical_section::Mutex;
 use embassy_executor::{InterruptExecutor, Spawner};
 use interrupt::Irq;
+use memory::Memory;
 use panic_semihosting as _;
 use sensor::{Bus, Pin, Walk};
 use sohle_shared::bmx055::blocking::Blocking;
 use sohle_shared::bmx055::counts::Header;
 use sohle_shared::bmx055::twin::{Chip, SimulatedBmx055, SimulatedDelay};
 use sohle_shared::bmx055::{Bmx055, Config, Die};
-use sohle_shared::calibration::Calibration;
 use sohle_shared::shoe::Shoe;
-use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::link::Identity;
 use sohle_shared::wire::message::{Refusal, ResetReason};
 use sohle_shared::wire::outbox::{Outbox, Pace};
+use sohle_shared::wire::port::Port;
 use sohle_shared::wire::transfer::Value;
+#[cfg(not(feature = "ble"))]
+use sohle_tasks::NoAir;
 use sohle_tasks::{Board, BoardHealth, Traffic, process, send, sense};
 use stack::Painted;
 use static_cell::{ConstStaticCell, StaticCell};
@@ -53,17 +65,34 @@ static PROCESS: InterruptExecutor = InterruptExecutor::new();
 /// Counts of the clock in which nothing was to be done.
 static IDLE: AtomicU32 = AtomicU32::new(0);
 
-/// The emulated machine has neither flash, battery nor watchdog.
+/// Laptops at a time.
+#[cfg(not(feature = "ble"))]
+const PORTS: usize = 1;
+#[cfg(feature = "ble")]
+const PORTS: usize = 2;
+
+#[cfg(feature = "ble")]
+static RADIO: InterruptExecutor = InterruptExecutor::new();
+/// Below that of everything else.
+#[cfg(feature = "ble")]
+const RADIO_PRIORITY: u8 = 224;
+
+/// The emulated machine has neither battery nor watchdog.
 struct Machine {
+    memory: Memory,
     stack: Painted,
     /// Counts of the clock, and those idle, at the last question.
     asked: (u32, u32),
 }
 
 impl Board for Machine {
-    async fn keep(&mut self, _: &Value) -> Result<(), Refusal> {
-        // In effect until the emulator ends, which is as long as its memory lasts.
-        Ok(())
+    async fn keep(&mut self, value: &Value) -> Result<(), Refusal> {
+        self.memory.keep(value)
+    }
+
+    #[cfg(feature = "ble")]
+    async fn keep_bonds(&mut self, bonds: &sohle_shared::bonds::Bonds) -> Result<(), Refusal> {
+        self.memory.keep_bonds(bonds)
     }
 
     fn health(&mut self) -> BoardHealth {
@@ -85,7 +114,22 @@ static WALK: Mutex<RefCell<Option<Walk>>> = Mutex::new(RefCell::new(None));
 
 /// What the die reads at this time. **Units:** ns since the power came.
 fn counts(die: Die, time_ns: u64) -> [i16; 3] {
+    #[cfg(feature = "ble")]
+    let time_ns = since_a_laptop_came(time_ns);
     critical_section::with(|cs| WALK.borrow_ref_mut(cs).as_mut().map_or([0; 3], |walk| walk.counts(die, time_ns)))
+}
+
+/// How long ago the first laptop said something; nothing while there was none.
+#[cfg(feature = "ble")]
+fn since_a_laptop_came(time_ns: u64) -> u64 {
+    static BEGUN: Mutex<core::cell::Cell<Option<u64>>> = Mutex::new(core::cell::Cell::new(None));
+    critical_section::with(|cs| {
+        let begun = BEGUN.borrow(cs);
+        if begun.get().is_none() && (uart::LAPTOP.was_used() || sohle_tasks::Air::is_open(&radio::RADIO)) {
+            begun.set(Some(time_ns));
+        }
+        begun.get().map_or(0, |begun| time_ns.saturating_sub(begun))
+    })
 }
 
 /// Starts what reads the sensor; what is spawned from outside an executor must not stay in one thread.
@@ -109,31 +153,46 @@ async fn sensing(twin: &'static RefCell<Twin>) {
 
 /// Starts the rest.
 #[embassy_executor::task]
-async fn start_processing(shoe: &'static mut Wearer, stack: Painted) {
-    let (received, sent) = uart::start();
+async fn start_processing(shoe: &'static mut Wearer, machine: Machine) {
+    let (received, sent) = uart::LAPTOP.start();
     // SAFETY: as above.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    spawner.spawn(processing(shoe, received, stack).expect("started once"));
+    spawner.spawn(processing(shoe, received, machine).expect("started once"));
     spawner.spawn(sending(sent).expect("started once"));
 }
 
 /// The shoe with its steps elsewhere.
-type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS>>;
+type Wearer = Shoe<STEPS, &'static mut Outbox<STEPS, PORTS>, PORTS>;
 
 /// A shoe. Not inlined: like this the compiler makes it where the caller wants it, and not a second one beside it.
 #[inline(never)]
-fn make() -> Wearer {
-    static OUTBOX: ConstStaticCell<Outbox<STEPS>> = ConstStaticCell::new(Outbox::blank());
-    // There is one boot: the line is new with every start of the emulator.
-    let identity = Identity { boot: 1, firmware: env!("CARGO_PKG_VERSION"), board: "mps2-an386" };
+fn make(memory: &mut Memory) -> Wearer {
+    static OUTBOX: ConstStaticCell<Outbox<STEPS, PORTS>> = ConstStaticCell::new(Outbox::blank());
+    let identity = Identity { boot: boot(), firmware: env!("CARGO_PKG_VERSION"), board: "mps2-an386" };
     let outbox = OUTBOX.take();
-    outbox.begin(Pace::SERIAL);
-    Shoe::new(identity, &Config::default(), &Parameters::default(), &Calibration::default(), outbox)
+    outbox.begin(Port::Serial, Pace::SERIAL);
+    #[cfg(feature = "ble")]
+    outbox.begin(Port::Radio, Pace::RADIO);
+    let (parameters, calibration) = memory.settings();
+    Shoe::new(identity, &Config::default(), &parameters, &calibration, outbox)
 }
 
+/// There is one boot: the line is new with every start of the emulator.
+#[cfg(not(feature = "ble"))]
+fn boot() -> u32 {
+    1
+}
+
+#[cfg(feature = "ble")]
+use radio::boot;
+
 #[embassy_executor::task]
-async fn processing(shoe: &'static mut Wearer, line: uart::Receiver, stack: Painted) {
-    process(&TRAFFIC, shoe, line, Machine { stack, asked: (0, 0) }).await
+async fn processing(shoe: &'static mut Wearer, line: uart::Receiver, machine: Machine) {
+    #[cfg(not(feature = "ble"))]
+    let air = &NoAir;
+    #[cfg(feature = "ble")]
+    let air = &radio::RADIO;
+    process(&TRAFFIC, shoe, line, air, machine).await
 }
 
 #[embassy_executor::task]
@@ -144,7 +203,12 @@ async fn sending(line: uart::Sender) {
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(number: i16) {
     match Irq::of(number) {
-        Some(Irq::UART_RECEIVED) => uart::on_received(),
+        Some(Irq::UART_RECEIVED) => uart::LAPTOP.on_received(),
+        #[cfg(feature = "ble")]
+        Some(Irq::HCI_RECEIVED) => uart::HCI.on_received(),
+        #[cfg(feature = "ble")]
+        // SAFETY: as below.
+        Some(Irq::RADIO) => unsafe { RADIO.on_interrupt() },
         Some(Irq::ALARM_TIMER) => clock::on_alarm(),
         Some(Irq::FREE_TIMER) => clock::on_round(),
         // SAFETY: called from the interrupt of this executor alone, which its start has unmasked.
@@ -157,13 +221,37 @@ unsafe fn DefaultHandler(number: i16) {
 
 /// Starts clock and tasks. Not inlined: what it takes of the stack is free again when the tasks run.
 #[inline(never)]
-fn set_off(header: Header, shoe: &'static mut Wearer, stack: Painted) {
+fn set_off(header: Header, shoe: &'static mut Wearer, machine: Machine) {
     clock::start();
     interrupt::prioritise(Irq::SENSE, SENSE_PRIORITY);
     interrupt::prioritise(Irq::PROCESS, PROCESS_PRIORITY);
     let sensing = start_sensing(header.accel_period_ns, header.gyro_period_ns).expect("started once");
     SENSE.start(Irq::SENSE).spawn(sensing);
-    PROCESS.start(Irq::PROCESS).spawn(start_processing(shoe, stack).expect("started once"));
+    #[cfg(feature = "ble")]
+    let mut machine = machine;
+    #[cfg(feature = "ble")]
+    let bonds = machine.memory.bonds();
+    PROCESS.start(Irq::PROCESS).spawn(start_processing(shoe, machine).expect("started once"));
+    #[cfg(feature = "ble")]
+    {
+        interrupt::prioritise(Irq::RADIO, RADIO_PRIORITY);
+        RADIO.start(Irq::RADIO).spawn(radio::start(bonds).expect("started once"));
+    }
+}
+
+/// Ends the emulator.
+fn give_up() -> ! {
+    debug::exit(debug::EXIT_FAILURE);
+    loop {}
+}
+
+#[inline(never)]
+fn open_memory() -> Memory {
+    let Some(memory) = Memory::open() else {
+        heprintln!("error: no flash; expected the name of a file for it after that of the walk");
+        give_up();
+    };
+    memory
 }
 
 /// Opens the walk. No board has one, so this comes before the stack is watched.
@@ -171,8 +259,7 @@ fn set_off(header: Header, shoe: &'static mut Wearer, stack: Painted) {
 fn open_walk() -> Header {
     let Some(walk) = Walk::open() else {
         heprintln!("error: no walk; expected the name of a file that 'sohle convert' wrote");
-        debug::exit(debug::EXIT_FAILURE);
-        loop {}
+        give_up();
     };
     let header = *walk.header();
     critical_section::with(|cs| WALK.borrow_ref_mut(cs).replace(walk));
@@ -181,12 +268,14 @@ fn open_walk() -> Header {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let mut shoe = make();
+    let mut memory = open_memory();
+    let mut shoe = make(&mut memory);
     let shoe = &raw mut shoe;
     // SAFETY: this function never returns, so its frame and the shoe in it stay for ever, and this is the only reference.
     let shoe: &'static mut Wearer = unsafe { &mut *shoe };
     let header = open_walk();
-    set_off(header, shoe, stack::paint(Some((&raw const _stack_start).addr() as u32)));
+    let stack = stack::paint(Some((&raw const _stack_start).addr() as u32));
+    set_off(header, shoe, Machine { memory, stack, asked: (0, 0) });
     loop {
         // Masked, an interrupt still ends the sleep, but is served after the time was taken.
         cortex_m::interrupt::disable();

@@ -1,7 +1,7 @@
 //! The sensor that is not there: its twin, fed with the counts of a walk from a file on the host.
 
+use super::desk::{self, File};
 use core::cell::RefCell;
-use cortex_m_semihosting::{nr, syscall};
 use embassy_time::Timer;
 use embedded_hal::digital::{Error, ErrorKind, ErrorType};
 use embedded_hal::spi::{self, Operation, SpiDevice};
@@ -17,7 +17,7 @@ const PAIRS: usize = 64;
 /// How long the foot stands still before the walk begins and after it has ended is the recording's affair; beyond its ends
 /// the first and the last pair are repeated.
 pub struct Walk {
-    file: usize,
+    file: File,
     header: Header,
     readers: [Reader; 2],
 }
@@ -36,13 +36,10 @@ struct Reader {
 impl Walk {
     /// Opens the file that the emulator's command line names; `None` if there is no such walk.
     pub fn open() -> Option<Self> {
-        let mut name = [0_u8; 512];
-        let length = command_line(&mut name)?;
-        // The first word stands for the program.
-        let begin = name.get(..length)?.iter().position(|&byte| byte == b' ')? + 1;
-        let file = open(name.get(begin..length)?)?;
+        let mut line = [0_u8; 512];
+        let file = File::open(desk::walk(&mut line)?)?;
         let mut header = [0; HEADER_BYTES];
-        read(file, 0, &mut header)?;
+        file.read(0, &mut header)?;
         let header = Header::from_bytes(&header).filter(|header| header.pairs > 0)?;
         let reader = |die, period_ns: u32| Reader {
             die,
@@ -69,7 +66,7 @@ impl Walk {
         if missing || !reader.filled {
             reader.first = pair;
             let offset = HEADER_BYTES + pair as usize * PAIR_BYTES;
-            reader.filled = read(self.file, offset, &mut reader.bytes).is_some();
+            reader.filled = self.file.read(offset, &mut reader.bytes).is_some();
         }
         let at = (pair - reader.first) as usize * PAIR_BYTES;
         let bytes = reader.bytes.get(at..).and_then(|rest| rest.first_chunk());
@@ -79,36 +76,6 @@ impl Walk {
             Die::Gyro => gyro,
         }
     }
-}
-
-/// Length of what the emulator was told as the program's arguments.
-fn command_line(buffer: &mut [u8]) -> Option<usize> {
-    let mut block = [buffer.as_mut_ptr() as usize, buffer.len()];
-    // SAFETY: the host writes at most so many bytes to the buffer, and the length to the block; both are alive.
-    let failed = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, block.as_mut_ptr() as usize) };
-    let [_, length] = block;
-    (failed == 0).then_some(length)
-}
-
-/// Opens a file of the host to be read; the name need not end in a zero.
-fn open(name: &[u8]) -> Option<usize> {
-    let mut text = [0_u8; 512];
-    text.get_mut(..name.len())?.copy_from_slice(name);
-    const READ_BINARY: usize = 1;
-    // SAFETY: the host reads so many bytes of the name, and the zero after them.
-    let file = unsafe { syscall!(OPEN, text.as_ptr(), READ_BINARY, name.len()) };
-    (file != usize::MAX).then_some(file)
-}
-
-/// Reads what is there from this place of the file on.
-fn read(file: usize, offset: usize, buffer: &mut [u8]) -> Option<()> {
-    // SAFETY: numbers only.
-    if unsafe { syscall!(SEEK, file, offset) } != 0 {
-        return None;
-    }
-    // SAFETY: the host writes at most so many bytes to the buffer.
-    let unread = unsafe { syscall!(READ, file, buffer.as_mut_ptr(), buffer.len()) };
-    (unread < buffer.len()).then_some(())
 }
 
 /// The bus as one chip select sees it: time passes on the sensor as it does here.

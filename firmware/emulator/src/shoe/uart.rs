@@ -1,19 +1,16 @@
-//! The serial line of the emulated machine, by interrupt.
+//! The serial lines of the emulated machine, by interrupt: one to the laptop, one to the Bluetooth controller.
 //!
-//! Registers: Arm Cortex-M System Design Kit, technical reference manual (DDI 0479), "APB UART". The emulator moves a byte at
-//! once, whatever the baud rate: sending is paced here to that of a real line.
+//! Registers: Arm Cortex-M System Design Kit, technical reference manual (DDI 0479), "APB UART"; addresses: Arm application
+//! note 386. The emulator moves a byte at once, whatever the baud rate: sending is paced here to that of a real line.
 
 use super::interrupt::{self, Irq};
 use core::convert::Infallible;
+use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_io_async::{ErrorType, Read, Write};
 
-/// Bytes that have come and wait.
-static RECEIVED: Pipe<CriticalSectionRawMutex, 1_024> = Pipe::new();
-
-const UART: *mut u32 = 0x4000_4000 as *mut u32;
 /// Registers, as offsets in words.
 const DATA: usize = 0;
 const STATE: usize = 1;
@@ -30,35 +27,70 @@ const RECEIVE_INTERRUPT: u32 = 1 << 3;
 /// A byte is ten bits at 921 600 baud.
 const BYTES_PER_S: u64 = 92_160;
 
-fn write(register: usize, value: u32) {
-    // SAFETY: the register is inside the UART's block, which only this module uses.
-    unsafe { UART.add(register).write_volatile(value) }
+/// A serial line.
+pub struct Line {
+    registers: usize,
+    interrupt: Irq,
+    /// Who is at the other end waits while there is no room.
+    handshake: bool,
+    /// Bytes that have come and wait.
+    received: Pipe<CriticalSectionRawMutex, 1_024>,
+    /// Something has come.
+    used: AtomicBool,
 }
 
-fn read(register: usize) -> u32 {
-    // SAFETY: as above.
-    unsafe { UART.add(register).read_volatile() }
-}
+/// To the laptop.
+pub static LAPTOP: Line = Line::new(0x4000_4000, Irq::UART_RECEIVED, false);
+/// To the Bluetooth controller. The emulator hands over a byte when the one before was taken, as a line with RTS and CTS does.
+#[cfg(feature = "ble")]
+pub static HCI: Line = Line::new(0x4000_5000, Irq::HCI_RECEIVED, true);
 
-/// Switches the line on.
-pub fn start() -> (Receiver, Sender) {
-    write(DIVIDER, 27);
-    write(CONTROL, SEND_ENABLE | RECEIVE_ENABLE | RECEIVE_INTERRUPT);
-    interrupt::enable(Irq::UART_RECEIVED, 64);
-    (Receiver, Sender { free: Instant::MIN })
-}
+impl Line {
+    const fn new(registers: usize, interrupt: Irq, handshake: bool) -> Self {
+        Self { registers, interrupt, handshake, received: Pipe::new(), used: AtomicBool::new(false) }
+    }
 
-/// A byte has come. Without room it is lost, as it would be on a line without handshake.
-pub fn on_received() {
-    // First: a byte that comes after the last look must raise it again.
-    write(CLEAR, 0b10);
-    while read(STATE) & STATE_RECEIVED != 0 {
-        let _ = RECEIVED.try_write(&[read(DATA) as u8]);
+    fn write(&self, register: usize, value: u32) {
+        // SAFETY: the register is inside the UART's block, which only this line uses.
+        unsafe { (self.registers as *mut u32).add(register).write_volatile(value) }
+    }
+
+    fn read(&self, register: usize) -> u32 {
+        // SAFETY: as above.
+        unsafe { (self.registers as *mut u32).add(register).read_volatile() }
+    }
+
+    /// Switches the line on.
+    pub fn start(&'static self) -> (Receiver, Sender) {
+        self.write(DIVIDER, 27);
+        self.write(CONTROL, SEND_ENABLE | RECEIVE_ENABLE | RECEIVE_INTERRUPT);
+        interrupt::enable(self.interrupt, 64);
+        (Receiver(self), Sender { line: self, free: Instant::MIN })
+    }
+
+    /// A byte has come. Without room and handshake it is lost.
+    pub fn on_received(&self) {
+        // First: a byte that comes after the last look must raise it again.
+        self.write(CLEAR, 0b10);
+        self.used.store(true, Ordering::Relaxed);
+        self.take();
+    }
+
+    /// Whether anything has come since the start.
+    #[cfg(feature = "ble")]
+    pub fn was_used(&self) -> bool {
+        self.used.load(Ordering::Relaxed)
+    }
+
+    fn take(&self) {
+        while self.read(STATE) & STATE_RECEIVED != 0 && !(self.handshake && self.received.is_full()) {
+            let _ = self.received.try_write(&[self.read(DATA) as u8]);
+        }
     }
 }
 
-/// The bytes of the laptop.
-pub struct Receiver;
+/// The bytes of the other end.
+pub struct Receiver(&'static Line);
 
 impl ErrorType for Receiver {
     type Error = Infallible;
@@ -66,12 +98,18 @@ impl ErrorType for Receiver {
 
 impl Read for Receiver {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
-        Ok(RECEIVED.read(buffer).await)
+        let length = self.0.received.read(buffer).await;
+        if self.0.handshake {
+            // One may wait for which there was no room.
+            critical_section::with(|_| self.0.take());
+        }
+        Ok(length)
     }
 }
 
-/// The bytes for the laptop.
+/// The bytes for the other end.
 pub struct Sender {
+    line: &'static Line,
     /// When a real line would have sent all so far.
     free: Instant,
 }
@@ -84,8 +122,8 @@ impl Write for Sender {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         Timer::at(self.free).await;
         for &byte in bytes {
-            while read(STATE) & STATE_FULL != 0 {}
-            write(DATA, u32::from(byte));
+            while self.line.read(STATE) & STATE_FULL != 0 {}
+            self.line.write(DATA, u32::from(byte));
         }
         let duration = Duration::from_micros(bytes.len() as u64 * 1_000_000 / BYTES_PER_S);
         self.free = Instant::now() + duration;

@@ -1,6 +1,8 @@
 //! STM32F405RG as on the Adafruit Feather STM32F405 Express: pins A0 to A5, D5 and D6 for the sensor, TX and RX for the
 //! laptop.
 //!
+//! With Bluetooth, TX and RX are the module's, with RTS and CTS at MI and SCK, and the laptop is at SCL and SDA.
+//!
 //! The feather's own SPI pins (SPI2) cannot be used: their DMA streams are the only ones of the serial port at TX and RX.
 
 use super::{Board, Sensor, chip_select, spi_config, uart_config};
@@ -32,6 +34,9 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM3 => dma::InterruptHandler<peripherals::DMA1_CH3>;
     EXTI9_5 => exti::InterruptHandler<interrupt::typelevel::EXTI9_5>;
     USART3 => usart::InterruptHandler<peripherals::USART3>;
+    DMA2_STREAM2 => dma::InterruptHandler<peripherals::DMA2_CH2>;
+    DMA2_STREAM7 => dma::InterruptHandler<peripherals::DMA2_CH7>;
+    USART1 => usart::InterruptHandler<peripherals::USART1>;
     RNG => rng::InterruptHandler<peripherals::RNG>;
 });
 
@@ -58,8 +63,22 @@ fn clocks() -> embassy_stm32::Config {
 pub fn start() -> Board {
     let p = embassy_stm32::init(clocks());
     let region = flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1;
+    let mut random = Rng::new(p.RNG, Irqs);
+    let boot = random.next_u32();
+    #[cfg(not(feature = "ble"))]
     let uart = Uart::new(p.USART3, p.PB11, p.PB10, p.DMA1_CH3, p.DMA1_CH1, Irqs, uart_config());
+    // The only serial port of the header with RTS and CTS is for the module.
+    #[cfg(feature = "ble")]
+    let uart = Uart::new(p.USART1, p.PB7, p.PB6, p.DMA2_CH7, p.DMA2_CH2, Irqs, uart_config());
     let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
+    #[cfg(feature = "ble")]
+    let radio = {
+        let (rts, cts) = (p.PB14, p.PB13);
+        let uart =
+            Uart::new_with_rtscts(p.USART3, p.PB11, p.PB10, rts, cts, p.DMA1_CH3, p.DMA1_CH1, Irqs, uart_config());
+        let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
+        super::Radio { tx, rx, button: ExtiInput::new(p.PB8, p.EXTI8, Pull::Up, Irqs), random }
+    };
     Board {
         sensor: Sensor {
             bus: Spi::new(p.SPI1, p.PA5, p.PA7, p.PA6, p.DMA2_CH3, p.DMA2_CH0, Irqs, spi_config()),
@@ -71,10 +90,12 @@ pub fn start() -> Board {
         },
         tx,
         rx,
+        #[cfg(feature = "ble")]
+        radio,
         flash: BlockingAsync::new(region),
         watchdog: IndependentWatchdog::new(p.IWDG, super::WATCHDOG_US),
         reset: reset_reason(),
-        boot: Rng::new(p.RNG, Irqs).next_u32(),
+        boot,
     }
 }
 
@@ -116,4 +137,21 @@ pub fn urgent() -> SendSpawner {
 unsafe fn CAN2_SCE() {
     // SAFETY: the handler of the interrupt that `urgent` gave to the executor; it is disabled before that.
     unsafe { URGENT.on_interrupt() }
+}
+
+#[cfg(feature = "ble")]
+static STEADY: InterruptExecutor = InterruptExecutor::new();
+
+/// Starts the executor of what follows the foot, below [`urgent`] and above Bluetooth.
+#[cfg(feature = "ble")]
+pub fn steady() -> SendSpawner {
+    interrupt::CAN2_RX0.set_priority(Priority::P7);
+    STEADY.start(interrupt::CAN2_RX0)
+}
+
+#[cfg(feature = "ble")]
+#[embassy_stm32::interrupt]
+unsafe fn CAN2_RX0() {
+    // SAFETY: the handler of the interrupt that `steady` gave to the executor; it is disabled before that.
+    unsafe { STEADY.on_interrupt() }
 }

@@ -16,6 +16,8 @@ use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::flash::FLASH_BASE;
 use embassy_stm32::gpio::{Level, Output, Pin, Pull, Speed};
 use embassy_stm32::mode::Async;
+#[cfg(feature = "ble")]
+use embassy_stm32::rng::Rng;
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, UartRx, UartTx};
@@ -45,6 +47,19 @@ pub struct Sensor {
     pub gyro_ready: ExtiInput<'static, Async>,
 }
 
+/// What Bluetooth needs.
+#[cfg(feature = "ble")]
+pub struct Radio {
+    /// To the module, by DMA, as long as it takes bytes (CTS).
+    pub tx: UartTx<'static, Async>,
+    /// From the module, by DMA.
+    pub rx: UartRx<'static, Async>,
+    /// Low while it is pressed.
+    pub button: ExtiInput<'static, Async>,
+    /// Keys are made of it.
+    pub random: Rng<'static, peripherals::RNG>,
+}
+
 /// Everything the firmware uses, once.
 pub struct Board {
     /// The sensor.
@@ -53,6 +68,9 @@ pub struct Board {
     pub tx: UartTx<'static, Async>,
     /// From the laptop, by DMA.
     pub rx: UartRx<'static, Async>,
+    /// Bluetooth.
+    #[cfg(feature = "ble")]
+    pub radio: Radio,
     /// Where calibration and settings are kept.
     pub flash: Flash,
     /// Not running yet. Its clock is off by up to a tenth.

@@ -1,4 +1,5 @@
-//! STM32WB55RG as on the Nucleo-WB55RG: Arduino header for the sensor, the probe's serial port for the laptop.
+//! STM32WB55RG as on the Nucleo-WB55RG: Arduino header for the sensor, the probe's serial port for the laptop, D0 and D1 with
+//! two pins of the morpho header for a Bluetooth module.
 //!
 //! The second core sleeps. With a wireless stack it would own the upper flash and share the flash interface, the random
 //! numbers and the 32 MHz crystal through hardware semaphores, none of which is taken here.
@@ -33,6 +34,10 @@ bind_interrupts!(struct Irqs {
     EXTI9_5 => exti::InterruptHandler<interrupt::typelevel::EXTI9_5>;
     EXTI15_10 => exti::InterruptHandler<interrupt::typelevel::EXTI15_10>;
     USART1 => usart::InterruptHandler<peripherals::USART1>;
+    DMA1_CHANNEL5 => dma::InterruptHandler<peripherals::DMA1_CH5>;
+    DMA1_CHANNEL6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
+    EXTI4 => exti::InterruptHandler<interrupt::typelevel::EXTI4>;
+    LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
     RNG => rng::InterruptHandler<peripherals::RNG>;
 });
 
@@ -58,6 +63,16 @@ pub fn start() -> Board {
     let region = flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region;
     let uart = Uart::new(p.USART1, p.PB7, p.PB6, p.DMA1_CH3, p.DMA1_CH4, Irqs, uart_config());
     let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
+    let mut random = Rng::new(p.RNG, Irqs);
+    let boot = random.next_u32();
+    #[cfg(feature = "ble")]
+    let radio = {
+        let (rts, cts) = (p.PB12, p.PB13);
+        let uart =
+            Uart::new_with_rtscts(p.LPUART1, p.PA3, p.PA2, rts, cts, p.DMA1_CH5, p.DMA1_CH6, Irqs, uart_config());
+        let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
+        super::Radio { tx, rx, button: ExtiInput::new(p.PC4, p.EXTI4, Pull::Up, Irqs), random }
+    };
     Board {
         sensor: Sensor {
             bus: Spi::new(p.SPI1, p.PA5, p.PA7, p.PA6, p.DMA1_CH1, p.DMA1_CH2, Irqs, spi_config()),
@@ -69,10 +84,12 @@ pub fn start() -> Board {
         },
         tx,
         rx,
+        #[cfg(feature = "ble")]
+        radio,
         flash: BlockingAsync::new(region),
         watchdog: IndependentWatchdog::new(p.IWDG, super::WATCHDOG_US),
         reset: reset_reason(),
-        boot: Rng::new(p.RNG, Irqs).next_u32(),
+        boot,
     }
 }
 
@@ -117,4 +134,21 @@ pub fn urgent() -> SendSpawner {
 unsafe fn SAI1() {
     // SAFETY: the handler of the interrupt that `urgent` gave to the executor; it is disabled before that.
     unsafe { URGENT.on_interrupt() }
+}
+
+#[cfg(feature = "ble")]
+static STEADY: InterruptExecutor = InterruptExecutor::new();
+
+/// Starts the executor of what follows the foot, below [`urgent`] and above Bluetooth.
+#[cfg(feature = "ble")]
+pub fn steady() -> SendSpawner {
+    interrupt::TSC.set_priority(Priority::P7);
+    STEADY.start(interrupt::TSC)
+}
+
+#[cfg(feature = "ble")]
+#[embassy_stm32::interrupt]
+unsafe fn TSC() {
+    // SAFETY: the handler of the interrupt that `steady` gave to the executor; it is disabled before that.
+    unsafe { STEADY.on_interrupt() }
 }
