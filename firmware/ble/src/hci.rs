@@ -136,6 +136,24 @@ pub struct Hci<'a, R> {
     own: Cell<u16>,
 }
 
+/// Resets the controller, and reads over all that it said before: after a fault, nobody knows where a packet begins.
+pub async fn reset(reader: &mut impl Read, writer: &mut impl Write) -> Result<(), Error> {
+    const RESET: [u8; 4] = [0x01, 0x03, 0x0c, 0x00];
+    /// Command complete: five parameters would be one too many; any number of commands may be sent; reset; success.
+    const DONE: [Option<u8>; 7] = [Some(0x04), Some(0x0e), Some(0x04), None, Some(0x03), Some(0x0c), Some(0x00)];
+    let reset = async {
+        writer.write_all(&RESET).await.map_err(|_| Error::Line)?;
+        let mut last = [0; DONE.len()];
+        while !last.iter().zip(DONE).all(|(&byte, wanted)| wanted.is_none_or(|wanted| wanted == byte)) {
+            last.rotate_left(1);
+            let [.., newest] = &mut last;
+            read(reader, core::slice::from_mut(newest)).await?;
+        }
+        Ok(())
+    };
+    with_timeout(RESET_PATIENCE, reset).await.unwrap_or(Err(Error::Silence))
+}
+
 impl<'a, R: Read> Hci<'a, R> {
     /// Before the first byte. `entropy` is random; keys are made of it and of the controller's own random numbers.
     pub fn new(reader: R, out: &'a Outward, radio: &'a Radio, entropy: [u8; 32]) -> Self {
@@ -151,25 +169,6 @@ impl<'a, R: Read> Hci<'a, R> {
             entropy: Cell::new(entropy),
             own: Cell::new(0),
         }
-    }
-
-    /// Resets the controller, and reads over all that it said before: after a fault, nobody knows where a packet begins.
-    pub async fn reset(&self, mut writer: impl Write) -> Result<(), Error> {
-        const RESET: [u8; 4] = [0x01, 0x03, 0x0c, 0x00];
-        /// Command complete: five parameters would be one too many; any number of commands may be sent; reset; success.
-        const DONE: [Option<u8>; 7] = [Some(0x04), Some(0x0e), Some(0x04), None, Some(0x03), Some(0x0c), Some(0x00)];
-        let mut reader = self.reader.lock().await;
-        let reset = async {
-            writer.write_all(&RESET).await.map_err(|_| Error::Line)?;
-            let mut last = [0; DONE.len()];
-            while !last.iter().zip(DONE).all(|(&byte, wanted)| wanted.is_none_or(|wanted| wanted == byte)) {
-                last.rotate_left(1);
-                let [.., newest] = &mut last;
-                read(&mut *reader, core::slice::from_mut(newest)).await?;
-            }
-            Ok(())
-        };
-        with_timeout(RESET_PATIENCE, reset).await.unwrap_or(Err(Error::Silence))
     }
 
     async fn send<P: PacketToController>(&self, packet: &P) -> Result<(), Error> {

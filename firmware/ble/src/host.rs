@@ -1,12 +1,13 @@
 //! The host: it keeps the controller running, is to be found, and pairs.
 
-use crate::hci::{Error, Hci, Outward};
+use crate::hci::{self, Error, Hci, Outward};
 use crate::radio::Radio;
 use crate::serve::{End, Serving};
 use crate::server::{self, Places, Server};
 use bt_hci::param::{AddrKind, BdAddr};
 use core::fmt::Write as _;
-use embassy_futures::select::{Either, select};
+use core::pin::pin;
+use embassy_futures::select::{Either3, select3};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
 use heapless::String;
@@ -75,16 +76,10 @@ pub async fn run<R: Read, W: Write>(
     let mut pause = PAUSE;
     loop {
         let begun = Instant::now();
-        let out = Outward::new();
-        let controller = Hci::new(&mut reader, &out, radio, entropy());
-        let error = match controller.reset(&mut writer).await {
-            Ok(()) => {
-                let session = session(radio, controller, device, &mut bonds, resources);
-                match select(session, out.pump(&mut writer)).await {
-                    Either::First(error) | Either::Second(error) => error,
-                }
-            }
-            Err(error) => error,
+        // Each of these futures is made where it stays: moved, they would be on the stack as well.
+        let error = {
+            let session = pin!(session(radio, (&mut reader, &mut writer), device, &mut bonds, entropy(), resources));
+            session.await
         };
         radio.open(false).await;
         radio.say(Level::Warn, error.words());
@@ -94,29 +89,48 @@ pub async fn run<R: Read, W: Write>(
 }
 
 /// Until the controller fails.
-async fn session<R: Read>(
+async fn session<R: Read, W: Write>(
     radio: &Radio,
-    controller: Hci<'_, R>,
+    (reader, writer): (&mut R, &mut W),
     device: Device,
     bonds: &mut Bonds,
+    entropy: [u8; 32],
     resources: &mut Resources,
 ) -> Error {
+    if let Err(error) = hci::reset(reader, writer).await {
+        return error;
+    }
+    let out = Outward::new();
+    let stack = stack(Hci::new(reader, &out, radio, entropy), device, bonds, resources);
+    let mut status = [0; STATUS_MAX];
+    let name = device.name();
+    let (server, places) = server::build(&name, &mut status, device.battery);
+    let mut runner = stack.runner();
+    let run = pin!(runner.run());
+    let serve = pin!(laptops(radio, &stack, &server, &places, &name, bonds));
+    let pump = pin!(out.pump(writer));
+    match select3(run, serve, pump).await {
+        Either3::First(Ok(())) => Error::Silence,
+        Either3::First(Err(error)) => cause(error),
+        Either3::Second(error) | Either3::Third(error) => error,
+    }
+}
+
+/// The host stack. Not inlined: what it takes of the stack is free again when it runs.
+#[inline(never)]
+fn stack<'s, 'a, R: Read>(
+    controller: Hci<'a, R>,
+    device: Device,
+    bonds: &Bonds,
+    resources: &'s mut Resources,
+) -> Stack<'s, 'a, R> {
     let address = Address::new(AddrKind::RANDOM, BdAddr::new(device.address));
     let stack = trouble_host::new(controller, resources).set_random_address(address).build();
     for bond in bonds.iter() {
         // There is room for more than are kept.
         let _ = stack.add_bond_information(information(bond));
     }
-    let mut status = [0; STATUS_MAX];
-    let name = device.name();
-    let (server, places) = server::build(&name, &mut status, device.battery);
-    let mut runner = stack.runner();
-    let serve = laptops(radio, &stack, &server, &places, &name, bonds);
-    match select(runner.run(), serve).await {
-        Either::First(Ok(())) => Error::Silence,
-        Either::First(Err(error)) => cause(error),
-        Either::Second(error) => error,
-    }
+    stack
 }
 
 /// One laptop after the other.
@@ -136,7 +150,11 @@ async fn laptops<R: Read>(
             Ok(None) => continue,
             Err(error) => return error,
         };
-        let end = Serving { radio, stack, server, places }.serve(connection, bonds).await;
+        let serving = Serving { radio, stack, server, places };
+        let end = {
+            let serve = pin!(serving.serve(connection, bonds));
+            serve.await
+        };
         radio.open(false).await;
         if let End::Failed(error) = end {
             return error;

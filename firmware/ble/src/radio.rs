@@ -51,7 +51,7 @@ impl Radio {
             news: Channel::new(),
             status: Mutex::new(RefCell::new(Vec::new())),
             status_changed: Signal::new(),
-            battery: AtomicU8::new(100),
+            battery: AtomicU8::new(0),
             hurry: AtomicBool::new(false),
             hurry_changed: Signal::new(),
             window: Mutex::new(Cell::new(Instant::MIN)),

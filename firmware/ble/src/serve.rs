@@ -6,6 +6,7 @@ use crate::radio::Radio;
 use crate::server::{Places, Server, Stream};
 use bt_hci::cmd::info::ReadBdAddr;
 use core::cell::Cell;
+use core::pin::pin;
 use embassy_futures::select::{Either, Either5, select, select5};
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer, with_timeout};
@@ -80,13 +81,17 @@ impl<'x, R: Read> Serving<'x, '_, '_, '_, R> {
         }
         let Ok(laptop) = connection.with_attribute_server(self.server) else { return End::Gone };
         let standing = Standing { trusted: Cell::new(false), became_trusted: Signal::new() };
-        let gone = self.events(&laptop, &standing, bonds);
-        let stream = self.stream(&laptop);
-        let status = self.status(&laptop, &standing);
-        match select5(gone, stream, status, self.manage(&laptop, &standing), self.stranger(&standing)).await {
-            Either5::First(()) => return End::Gone,
-            Either5::Fourth(error) => return End::Failed(error),
-            Either5::Second(()) | Either5::Third(()) | Either5::Fifth(()) => laptop.raw().disconnect(),
+        {
+            let gone = pin!(self.events(&laptop, &standing, bonds));
+            let stream = pin!(self.stream(&laptop));
+            let status = pin!(self.status(&laptop, &standing));
+            let manage = pin!(self.manage(&laptop, &standing));
+            let stranger = pin!(self.stranger(&standing));
+            match select5(gone, stream, status, manage, stranger).await {
+                Either5::First(()) => return End::Gone,
+                Either5::Fourth(error) => return End::Failed(error),
+                Either5::Second(()) | Either5::Third(()) | Either5::Fifth(()) => laptop.raw().disconnect(),
+            }
         }
         // Its last events are of no interest, but the one that it is gone.
         let farewell = async { while !matches!(laptop.next().await, GattConnectionEvent::Disconnected { .. }) {} };
