@@ -5,7 +5,7 @@
 //!
 //! The feather's own SPI pins (SPI2) cannot be used: their DMA streams are the only ones of the serial port at TX and RX.
 
-use super::{Board, Sensor, chip_select, spi_config, uart_config};
+use super::{Board, LAPTOP_BAUD, Sensor, chip_select, spi_config, uart_config};
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::exti::{self, ExtiInput};
@@ -66,17 +66,26 @@ pub fn start() -> Board {
     let mut random = Rng::new(p.RNG, Irqs);
     let boot = random.next_u32();
     #[cfg(not(feature = "ble"))]
-    let uart = Uart::new(p.USART3, p.PB11, p.PB10, p.DMA1_CH3, p.DMA1_CH1, Irqs, uart_config());
+    let uart = Uart::new(p.USART3, p.PB11, p.PB10, p.DMA1_CH3, p.DMA1_CH1, Irqs, uart_config(LAPTOP_BAUD));
     // The only serial port of the header with RTS and CTS is for the module.
     #[cfg(feature = "ble")]
-    let uart = Uart::new(p.USART1, p.PB7, p.PB6, p.DMA2_CH7, p.DMA2_CH2, Irqs, uart_config());
+    let uart = Uart::new(p.USART1, p.PB7, p.PB6, p.DMA2_CH7, p.DMA2_CH2, Irqs, uart_config(LAPTOP_BAUD));
     let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
     #[cfg(feature = "ble")]
     let radio = {
         let (rts, cts) = (p.PB14, p.PB13);
-        let uart =
-            Uart::new_with_rtscts(p.USART3, p.PB11, p.PB10, rts, cts, p.DMA1_CH3, p.DMA1_CH1, Irqs, uart_config());
-        let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
+        let uart = Uart::new_with_rtscts(
+            p.USART3,
+            p.PB11,
+            p.PB10,
+            rts,
+            cts,
+            p.DMA1_CH3,
+            p.DMA1_CH1,
+            Irqs,
+            uart_config(super::HCI_BAUD),
+        );
+        let (tx, rx) = uart.expect("the clock divides to 1000000 baud").split();
         super::Radio { tx, rx, button: ExtiInput::new(p.PB8, p.EXTI8, Pull::Up, Irqs), random }
     };
     Board {

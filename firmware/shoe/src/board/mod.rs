@@ -94,6 +94,12 @@ pub fn store() -> Range<u32> {
     offset((&raw const _store_start).addr())..offset((&raw const _store_end).addr())
 }
 
+/// Of the line to the laptop.
+const LAPTOP_BAUD: u32 = 921_600;
+/// Of the line to the Bluetooth module: what Zephyr's controller firmware has when nobody changes it.
+#[cfg(feature = "ble")]
+const HCI_BAUD: u32 = 1_000_000;
+
 /// How long the watchdog waits. **Units:** microseconds.
 const WATCHDOG_US: u32 = 4_000_000;
 
@@ -109,9 +115,10 @@ fn spi_config() -> spi::Config {
     config
 }
 
-fn uart_config() -> usart::Config {
+/// 8N1.
+fn uart_config(baud: u32) -> usart::Config {
     let mut config = usart::Config::default();
-    config.baudrate = 921_600;
+    config.baudrate = baud;
     // A line that is not connected is silent.
     config.rx_pull = Pull::Up;
     config

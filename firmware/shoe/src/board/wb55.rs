@@ -4,7 +4,7 @@
 //! The second core sleeps. With a wireless stack it would own the upper flash and share the flash interface, the random
 //! numbers and the 32 MHz crystal through hardware semaphores, none of which is taken here.
 
-use super::{Board, Sensor, chip_select, spi_config, uart_config};
+use super::{Board, LAPTOP_BAUD, Sensor, chip_select, spi_config, uart_config};
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::exti::{self, ExtiInput};
@@ -61,16 +61,25 @@ fn clocks() -> embassy_stm32::Config {
 pub fn start() -> Board {
     let p = embassy_stm32::init(clocks());
     let region = flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region;
-    let uart = Uart::new(p.USART1, p.PB7, p.PB6, p.DMA1_CH3, p.DMA1_CH4, Irqs, uart_config());
+    let uart = Uart::new(p.USART1, p.PB7, p.PB6, p.DMA1_CH3, p.DMA1_CH4, Irqs, uart_config(LAPTOP_BAUD));
     let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
     let mut random = Rng::new(p.RNG, Irqs);
     let boot = random.next_u32();
     #[cfg(feature = "ble")]
     let radio = {
         let (rts, cts) = (p.PB12, p.PB13);
-        let uart =
-            Uart::new_with_rtscts(p.LPUART1, p.PA3, p.PA2, rts, cts, p.DMA1_CH5, p.DMA1_CH6, Irqs, uart_config());
-        let (tx, rx) = uart.expect("the clock divides to 921600 baud").split();
+        let uart = Uart::new_with_rtscts(
+            p.LPUART1,
+            p.PA3,
+            p.PA2,
+            rts,
+            cts,
+            p.DMA1_CH5,
+            p.DMA1_CH6,
+            Irqs,
+            uart_config(super::HCI_BAUD),
+        );
+        let (tx, rx) = uart.expect("the clock divides to 1000000 baud").split();
         super::Radio { tx, rx, button: ExtiInput::new(p.PC4, p.EXTI4, Pull::Up, Irqs), random }
     };
     Board {
