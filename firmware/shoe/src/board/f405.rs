@@ -34,8 +34,11 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM3 => dma::InterruptHandler<peripherals::DMA1_CH3>;
     EXTI9_5 => exti::InterruptHandler<interrupt::typelevel::EXTI9_5>;
     USART3 => usart::InterruptHandler<peripherals::USART3>;
+    #[cfg(feature = "ble")]
     DMA2_STREAM2 => dma::InterruptHandler<peripherals::DMA2_CH2>;
+    #[cfg(feature = "ble")]
     DMA2_STREAM7 => dma::InterruptHandler<peripherals::DMA2_CH7>;
+    #[cfg(feature = "ble")]
     USART1 => usart::InterruptHandler<peripherals::USART1>;
     RNG => rng::InterruptHandler<peripherals::RNG>;
 });

@@ -34,9 +34,13 @@ bind_interrupts!(struct Irqs {
     EXTI9_5 => exti::InterruptHandler<interrupt::typelevel::EXTI9_5>;
     EXTI15_10 => exti::InterruptHandler<interrupt::typelevel::EXTI15_10>;
     USART1 => usart::InterruptHandler<peripherals::USART1>;
+    #[cfg(feature = "ble")]
     DMA1_CHANNEL5 => dma::InterruptHandler<peripherals::DMA1_CH5>;
+    #[cfg(feature = "ble")]
     DMA1_CHANNEL6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
+    #[cfg(feature = "ble")]
     EXTI4 => exti::InterruptHandler<interrupt::typelevel::EXTI4>;
+    #[cfg(feature = "ble")]
     LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
     RNG => rng::InterruptHandler<peripherals::RNG>;
 });
