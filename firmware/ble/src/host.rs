@@ -64,7 +64,7 @@ type Stack<'s, 'a, R> = trouble_host::Stack<'s, Hci<'a, R>, DefaultPacketPool>;
 /// Serves laptops by the controller at this line, for ever.
 ///
 /// `bonds` are those that were kept, `entropy` gives random bytes of the board. To be run where it may take a while: pairing
-/// computes for hundreds of milliseconds.
+/// computes for a tenth of a second and more.
 pub async fn run<R: Read, W: Write>(
     radio: &Radio,
     (mut reader, mut writer): (R, W),

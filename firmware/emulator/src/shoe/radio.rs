@@ -1,6 +1,6 @@
 //! Bluetooth of the emulated shoe: its controller is whatever the emulator connects to the second serial line.
 //!
-//! It runs below everything else: pairing takes the processor for hundreds of milliseconds, which the tracker would not
+//! It runs below everything else: pairing takes the processor for a tenth of a second and more, which the tracker would not
 //! forgive.
 
 use super::{desk, uart};
