@@ -9,7 +9,8 @@ pub const BONDS: usize = 4;
 /// A device that has paired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bond {
-    /// Kind of the identity address: 0 public, 1 random and static (Bluetooth Core Specification 5.4, volume 4, part E, 7.8.12).
+    /// Kind of the identity address: 0 public, 1 random and static (Bluetooth Core Specification 5.4, volume 4, part E,
+    /// 7.8.12).
     pub address_kind: u8,
     /// Identity address, the lowest byte first.
     pub address: [u8; 6],

@@ -9,7 +9,8 @@
 //! [`step`]. Rotations are in [`so3`], the detectors that tell when the foot stands in [`stance`], the filters that follow
 //! it in [`filter`]. [`calibration`] takes out of the samples what is known of the unit. Everything comes together in
 //! [`tracker`] and, from the registers of the sensor on, in [`shoe`]; `wire` (a feature) carries what it finds to the
-//! laptop; `bonds` (feature `store`) are the laptops that have paired with it; [`selftest`] proves that a processor computes it as every other does.
+//! laptop; `bonds` (feature `store`) are the laptops that have paired with it; [`selftest`] proves that a processor computes
+//! it as every other does.
 //!
 //! No heap, no clock, no panic on any input, `f32` only, every transcendental function from `libm`.
 #![no_std]

@@ -28,8 +28,8 @@ pub(crate) struct Places {
     pub(crate) battery: Option<Characteristic<u8>>,
 }
 
-/// All attributes of a device of this name. None of the shoe's own can be read, written or subscribed to on an open link. Not
-/// inlined: what it takes of the stack is free again when the server serves.
+/// All attributes of a device of this name. None of the shoe's own can be read, written or subscribed to on an open link.
+/// Not inlined: what it takes of the stack is free again when the server serves.
 #[inline(never)]
 pub(crate) fn build<'v>(name: &'v str, status: &'v mut [u8; STATUS_MAX], battery: bool) -> (Server<'v>, Places) {
     let mut table = AttributeTable::new();

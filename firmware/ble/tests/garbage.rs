@@ -1,4 +1,5 @@
-//! Whatever the controller or a peer says: nothing panics, the tracker's side never waits, and the shoe is to be found again.
+//! Whatever the controller or a peer says: nothing panics, the tracker's side never waits, and the shoe is to be found
+//! again.
 
 mod controller;
 

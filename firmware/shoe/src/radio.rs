@@ -26,8 +26,8 @@ const WINDOW_S: u16 = 60;
 /// So long the button has to be pressed, which a spike on its wire is not. **Units:** ms.
 const PRESSED_MS: u64 = 50;
 
-/// Starts it where everything else goes before it: pairing takes the processor for a tenth of a second and more. Panics when it is
-/// called twice.
+/// Starts it where everything else goes before it: pairing takes the processor for a tenth of a second and more. Panics when
+/// it is called twice.
 pub fn start(spawner: Spawner, parts: board::Radio, bonds: Bonds) {
     static BUFFER: StaticCell<[u8; RING]> = StaticCell::new();
     let board::Radio { tx, rx, button, random } = parts;

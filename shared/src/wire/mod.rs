@@ -2,9 +2,8 @@
 //!
 //! A [`message`] is a postcard value with a checksum in a [`frame`]. A finished step is packed into 40 bytes
 //! ([`packed`]), kept in the [`outbox`] of the shoe (in half as many) until the laptop of each [`port`] has acknowledged it,
-//! and put in order by the laptop's
-//! [`inbox`]. [`link`] is the shoe's whole end of the wire; the laptop's is in the `sohle` crate. Parameters and calibration,
-//! which are too long for a message, go in pieces ([`transfer`]).
+//! and put in order by the laptop's [`inbox`]. [`link`] is the shoe's whole end of the wire; the laptop's is in the `sohle`
+//! crate. Parameters and calibration, which are too long for a message, go in pieces ([`transfer`]).
 //!
 //! Both ends compile this module, so there is no second definition of anything; [`SCHEMA`] tells two ends apart that were
 //! compiled from different ones.

@@ -1,4 +1,5 @@
-//! The flash of the emulated shoe: a file, so that what was kept survives the end of the emulator as it does a loss of power.
+//! The flash of the emulated shoe: a file, so that what was kept survives the end of the emulator as it does a loss of
+//! power.
 
 use super::desk::{self, File};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};

@@ -31,8 +31,8 @@ async fn radio(bonds: Bonds) {
     run(&RADIO, line, Device::new(ADDRESS, false), bonds, entropy, RESOURCES.init(Resources::new())).await
 }
 
-/// Of the clock of the machine that runs the emulator, for want of anything better: whoever knows when it was started can guess
-/// it. A board has a generator of random numbers.
+/// Of the clock of the machine that runs the emulator, for want of anything better: whoever knows when it was started can
+/// guess it. A board has a generator of random numbers.
 fn entropy() -> [u8; 32] {
     let mut state = desk::moment();
     let mut bytes = [0; 32];

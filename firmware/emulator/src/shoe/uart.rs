@@ -41,7 +41,8 @@ pub struct Line {
 
 /// To the laptop.
 pub static LAPTOP: Line = Line::new(0x4000_4000, Irq::UART_RECEIVED, false);
-/// To the Bluetooth controller. The emulator hands over a byte when the one before was taken, as a line with RTS and CTS does.
+/// To the Bluetooth controller. The emulator hands over a byte when the one before was taken, as a line with RTS and CTS
+/// does.
 #[cfg(feature = "ble")]
 pub static HCI: Line = Line::new(0x4000_5000, Irq::HCI_RECEIVED, true);
 

@@ -1,5 +1,5 @@
-//! STM32WB55RG as on the Nucleo-WB55RG: Arduino header for the sensor, the probe's serial port for the laptop, D0 and D1 with
-//! two pins of the morpho header for a Bluetooth module.
+//! STM32WB55RG as on the Nucleo-WB55RG: Arduino header for the sensor, the probe's serial port for the laptop, D0 and D1
+//! with two pins of the morpho header for a Bluetooth module.
 //!
 //! The second core sleeps. With a wireless stack it would own the upper flash and share the flash interface, the random
 //! numbers and the 32 MHz crystal through hardware semaphores, none of which is taken here.
