@@ -244,6 +244,7 @@ mod tests {
     use super::*;
     use crate::building::generate;
     use crate::evaluation::building::walk::{Walk, Walker};
+    use crate::particle::Cluster;
     use crate::simulation::Person;
 
     fn from(start: &str) -> Follower {
@@ -311,6 +312,26 @@ mod tests {
         assert!(first(&follower) < first(&alone), "{} {}", first(&follower), first(&alone));
         let off = (follower.estimate().place().unwrap().position - walk.truth.last().unwrap()).xy().norm();
         assert!(off < 1.5, "{off}");
+    }
+
+    #[test]
+    fn who_is_believed_to_be_elsewhere_is_looked_for_where_several_positions_say() {
+        let walk = walk(&["W02", "W05", "hall", "E03"]);
+        let end = |heard: bool| {
+            // The same room a floor above: the floors are alike, and nothing in the building tells that this is wrong.
+            let mut follower = from(&format!("1,{},{}", walk.truth[0].x, walk.truth[0].y));
+            for (index, (step, truth)) in walk.steps.iter().zip(&walk.truth).enumerate() {
+                follower.step(step);
+                if heard && index % 3 == 2 {
+                    let said = Observation::position(step.stance_end, [truth.x, truth.y], 0.5);
+                    follower.observe(&Observation { floor: Some(0), ..said });
+                }
+            }
+            let off = |place: &Cluster| (place.floor, (place.position - walk.truth.last().unwrap()).xy().norm() < 1.0);
+            (follower.estimate().state, follower.estimate().place().map(off))
+        };
+        assert_eq!(end(true), (State::Located, Some((0, true))));
+        assert_eq!(end(false), (State::Located, Some((1, true))));
     }
 
     #[test]

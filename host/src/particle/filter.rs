@@ -72,6 +72,8 @@ pub struct ParticleFilter {
     times: VecDeque<(u32, Micros)>,
     /// What was said of the place since the last step.
     waiting: Vec<(Micros, Sight)>,
+    /// How many positions in succession contradicted what was believed.
+    contradicted: usize,
     spread: Spread,
     /// Logarithm of the odds against the cloud, never below 0.
     against: f64,
@@ -131,6 +133,7 @@ impl ParticleFilter {
             previous: None,
             times: VecDeque::new(),
             waiting: Vec::new(),
+            contradicted: 0,
             spread: Spread::of(&seeded),
             particles: seeded.particles,
             against: 0.0,
@@ -226,29 +229,51 @@ impl ParticleFilter {
             moved = motion::advance(&mut self.particles, &self.map, step, &self.parameters, self.seed, self.number);
             self.draw(&moved);
         }
+        self.join(believed);
+        moved
+    }
+
+    /// Looks for the person in these patches, where others see them, against what is believed.
+    fn search_in(&mut self, patches: &[Patch]) {
+        self.against = 0.0;
+        self.clear_steps = 0;
+        self.doubtful.clear();
+        self.estimate.state = State::Lost;
+        let believed = std::mem::take(&mut self.particles);
+        self.sow_in(patches);
+        self.join(believed);
+    }
+
+    /// Leaves a part of the weight to what was believed before the others were sown.
+    fn join(&mut self, believed: Vec<Particle>) {
         let count = self.particles.len();
         weigh(&mut self.particles, (1.0 - BELIEVED_PART) * count as f32);
         self.particles.extend(believed);
         weigh(&mut self.particles[count..], BELIEVED_PART * count as f32);
-        moved
     }
 
     /// Sows new particles around the likeliest of `leaders` and, thinly, everywhere, in place of all there were; only
     /// everywhere, if the radius is so large that the place of the leaders says nothing.
     fn sow_around(&mut self, leaders: &[Cluster], radius: f32) {
+        let leaders = if radius < ANYWHERE_M { leaders } else { &[] };
+        let likely = leaders.iter().take(3).filter(|leader| leader.probability > 0.1);
+        let patch = |leader: &Cluster| Patch {
+            floor: leader.floor_index,
+            centre: [leader.position.x as f32, leader.position.y as f32],
+            radius: radius + 2.0 * leader.sigma_m() as f32,
+        };
+        self.sow_in(&likely.map(patch).collect::<Vec<_>>());
+    }
+
+    /// Sows new particles in these patches and, thinly, everywhere, in place of all there were.
+    fn sow_in(&mut self, patches: &[Patch]) {
         let mut stream = Stream::new(self.seed, Purpose::Recover, self.number, 0);
         let mut parameters = self.parameters.clone();
-        let leaders = if radius < ANYWHERE_M { leaders } else { &[] };
-        if !leaders.is_empty() {
+        if !patches.is_empty() {
             parameters.most /= 2;
         }
         let mut around = Vec::new();
-        for leader in leaders.iter().take(3).filter(|leader| leader.probability > 0.1) {
-            let patch = Patch {
-                floor: leader.floor_index,
-                centre: [leader.position.x as f32, leader.position.y as f32],
-                radius: radius + 2.0 * leader.sigma_m() as f32,
-            };
+        for &patch in patches {
             around.extend(start::everywhere(&self.map, &parameters, Some(patch), &mut stream).particles);
         }
         let everywhere = start::everywhere(&self.map, &parameters, None, &mut stream);

@@ -41,5 +41,6 @@ pub use filter::ParticleFilter;
 pub use grid::Wall;
 pub use map::{Connector, ConnectorKind, Map, Plan};
 pub use parameters::{Method, Parameters};
+pub(crate) use sight::STANDS_US;
 pub use sight::{Seen, Sight};
 pub use start::{Start, StartPlace};

@@ -10,6 +10,9 @@ use super::motion::Moved;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
+/// Somebody of whom no step comes for so long stands. **Units:** us.
+pub(crate) const STANDS_US: i64 = 1_500_000;
+
 /// What was seen of the place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Seen {
@@ -41,6 +44,11 @@ pub struct Sight {
 }
 
 impl Sight {
+    /// [`Self::outlier`], within its bounds.
+    pub(crate) fn odds(&self) -> f64 {
+        if self.outlier.is_finite() { self.outlier.clamp(1e-9, 1.0) } else { 1.0 }
+    }
+
     /// The same of somebody who may have gone on since (variance of each coordinate). **Units:** m².
     pub(super) fn within(&self, variance: f64) -> Self {
         let seen = match self.seen {
@@ -55,7 +63,7 @@ impl Sight {
     /// Weighs the particles by where they are, or by where they were if `spots` tells of each. `floor` is the index of the floor
     /// that the source names.
     pub(super) fn weigh(&self, particles: &mut [Particle], spots: Option<&[Spot]>, floor: Option<usize>) -> Moved {
-        let outlier = if self.outlier.is_finite() { self.outlier.clamp(1e-9, 1.0) } else { 1.0 };
+        let outlier = self.odds();
         let inverse = match self.seen {
             Seen::Place(_, covariance) => covariance.try_inverse().unwrap_or_else(Matrix2::zeros),
             Seen::Range { sigma_m, .. } => Matrix2::identity() * (sigma_m * sigma_m).max(1e-6).recip(),

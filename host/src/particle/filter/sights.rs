@@ -1,19 +1,22 @@
 //! What other sources say of the place: it counts where the particles were when it was measured.
 
 use super::ParticleFilter;
-use crate::particle::estimate::Estimate;
+use crate::particle::estimate::{Estimate, State};
 use crate::particle::motion::Moved;
 use crate::particle::parameters::Method;
-use crate::particle::sight::Sight;
+use crate::particle::sight::{STANDS_US, Seen, Sight};
+use crate::particle::start::Patch;
 use sohle_shared::time::Micros;
 
 /// Steps whose times are remembered. Nobody's word is later.
 pub(super) const REMEMBERED: usize = 120;
-/// Somebody of whom no step comes for so long stands. **Units:** us.
-const STANDS_US: i64 = 1_500_000;
 /// How fast somebody goes, and how far before a step must have been told. **Units:** m/s; m.
 const GOES_M_S: f64 = 1.4;
 const BETWEEN_M: f64 = 0.4;
+/// When so many positions in succession fit nothing that is believed, the person is looked for around the last, within so many
+/// standard deviations and this. **Units:** m.
+const CONTRADICTED: usize = 3;
+const SOWN_WITHIN: (f64, f64) = (2.0, 3.0);
 /// Nothing that is older counts where the past of the particles is not remembered. **Units:** s.
 const OLDEST_S: f64 = 5.0;
 
@@ -63,6 +66,7 @@ impl ParticleFilter {
             }
         };
         self.number += 1;
+        let moved = if self.contradicts(sight, &moved) { self.search_where_seen(sight, floor) } else { moved };
         let parents = match self.parameters.method {
             Method::Documented => self.draw_documented(&moved),
             Method::Covariance => self.draw(&moved),
@@ -71,6 +75,31 @@ impl ParticleFilter {
             self.ancestry.redraw(&parents);
         }
         Some(moved)
+    }
+
+    /// Whether it is time to believe others more than the cloud.
+    fn contradicts(&mut self, sight: &Sight, moved: &Moved) -> bool {
+        let all = matches!(self.parameters.method, Method::Covariance) && self.estimate.state != State::Searching;
+        // Nothing fits when all weights are those of an outlier.
+        let fits = moved.after > 2.0 * sight.odds() * moved.before;
+        if !matches!(sight.seen, Seen::Place(..)) || !all || fits {
+            self.contradicted = 0;
+            return false;
+        }
+        self.contradicted += 1;
+        self.contradicted >= CONTRADICTED
+    }
+
+    /// Sows around a place that others tell of, and weighs by it.
+    fn search_where_seen(&mut self, sight: &Sight, floor: Option<usize>) -> Moved {
+        self.contradicted = 0;
+        if let Seen::Place([x, y], covariance) = sight.seen {
+            let radius = SOWN_WITHIN.0 * covariance.trace().max(0.0).sqrt() + SOWN_WITHIN.1;
+            let patch = |floor| Patch { floor, centre: [x as f32, y as f32], radius: radius as f32 };
+            let floors = floor.map_or(0..self.map.floors().count(), |floor| floor..floor + 1);
+            self.search_in(&floors.map(patch).collect::<Vec<_>>());
+        }
+        sight.weigh(&mut self.particles, None, floor)
     }
 
     /// Weighs the particles by where they are, though it was measured before: somebody may have gone anywhere since.
