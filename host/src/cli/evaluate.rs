@@ -216,7 +216,7 @@ fn run_suite(which: Suite, args: &Args) -> Result<(), Error> {
             let walks = phone::walk::all()?;
             let steps = crate::phone::Parameters::default();
             let [eight, mall @ ..] = &walks[..] else { return Ok(()) };
-            let comparison = fixes::eight::Comparison::of(eight, &steps);
+            let comparison = fixes::eight::Comparison::of(eight, &steps)?;
             if let Some(folder) = &args.pictures {
                 drawn::fixes(eight, &comparison, folder)?;
             }

@@ -9,6 +9,9 @@ use crate::fixes::extended::Extended;
 use crate::fixes::kalman::Kalman;
 use crate::fixes::{Documented, Measured, Observation, Outliers, Smoother, smoother};
 use crate::follow::sight;
+use crate::graph::draw::{self, draw};
+use crate::graph::matcher::{self, Matcher};
+use crate::graph::{self, Graph};
 use crate::particle::{self, ParticleFilter, StartPlace};
 use crate::phone;
 use crate::phone::sample::WayPoint;
@@ -77,15 +80,21 @@ pub struct Comparison<'a> {
     observations: Vec<Observation>,
     /// Direction of the first heading frame along the first leg. **Units:** rad.
     direction: Option<f64>,
+    graph: Graph,
 }
 
 impl<'a> Comparison<'a> {
-    /// Finds the steps.
-    pub fn of(walk: &'a PhoneWalk, parameters: &phone::Parameters) -> Self {
+    /// Finds the steps, and draws the walk graph of the floor.
+    ///
+    /// # Errors
+    /// When the graph is of no use.
+    pub fn of(walk: &'a PhoneWalk, parameters: &phone::Parameters) -> Result<Self, graph::Error> {
+        let mut building = walk.building.clone();
+        building.graph = Some(draw(&building, &draw::Parameters::default()));
         let steps = phone::steps(&walk.samples, parameters);
         let said = walk.positions.iter().map(|said| Observation::position(said.time, said.place, SIGMA_M));
         let direction = Path::of(&steps).on_first_leg(&walk.way_points).map(|(_, direction)| direction);
-        Self { walk, observations: said.collect(), steps, direction }
+        Ok(Self { walk, observations: said.collect(), steps, direction, graph: Graph::of(&building)? })
     }
 
     /// All methods at all rates.
@@ -121,6 +130,8 @@ impl<'a> Comparison<'a> {
                     let [said, corrected] = self.on_the_map(every, particle, seed)?;
                     push("map", said);
                     push("map, corrected", corrected);
+                    let matched = |said: &[Observation]| self.matched(said).unwrap_or_default();
+                    push("graph", of_all(&matched));
                 }
             }
         }
@@ -196,6 +207,29 @@ impl<'a> Comparison<'a> {
         };
         let found = runs.par_iter().map(run).collect::<Result<Vec<_>, _>>()?;
         Ok([0, 1].map(|kind| together(found.iter().map(|errors| errors[kind].clone()).collect())))
+    }
+
+    /// Steps, positions and the walk graph in the matcher, as it is said; nothing of a walk without a first leg.
+    fn matched(&self, said: &[Observation]) -> Option<Path> {
+        let place = matcher::Place {
+            floor: self.walk.floor,
+            place: self.walk.way_points.first()?.place,
+            sigma_m: f64::from(START_SIGMA_M),
+            heading: Some((self.direction?, DIRECTION_SIGMA)),
+        };
+        let start = matcher::Start::At(vec![place]);
+        let mut matcher = Matcher::new(&self.graph, &matcher::Parameters::phone(), &start).ok()?;
+        let mut path = Path::default();
+        let mut waiting = said.iter().peekable();
+        for step in &self.steps {
+            while let Some(observation) = waiting.next_if(|observation| observation.time < step.stance_end) {
+                matcher.sight(&sight(observation, &Outliers::default()), observation.time);
+            }
+            if let Some(place) = matcher.step(step).place() {
+                path.note(step.stance_end, place.position);
+            }
+        }
+        Some(path)
     }
 
     fn followed(&self, said: &[Observation], p: &particle::Parameters, seed: u64) -> Result<[Path; 2], Error> {

@@ -3,8 +3,9 @@
 use super::hypothesis::Hypothesis;
 use super::{LEVEL_M, Matcher, near};
 use crate::building::geometry::Point;
-use crate::graph::EdgeId;
+use crate::graph::{EdgeId, Graph};
 use nalgebra::{Matrix2, Vector2};
+use std::borrow::Borrow;
 use std::fmt;
 
 /// What belongs to one place is no farther from its likeliest hypothesis. **Units:** m.
@@ -116,7 +117,7 @@ struct Sums<'h> {
     scale: f64,
 }
 
-impl Matcher<'_> {
+impl<G: Borrow<Graph>> Matcher<G> {
     /// Puts hypotheses together that mean the same place.
     pub(super) fn estimated(&self, step: u32, sown: usize) -> Estimate {
         let measured = self.with_heights.then_some(self.height_m);
@@ -176,13 +177,13 @@ impl Matcher<'_> {
     fn likely(&self, sums: &Sums<'_>, total: f64) -> Likely {
         let off = sums.first / sums.weight;
         let [x, y] = sums.best.place();
-        let way = self.net.way(sums.best.way);
+        let (way, graph) = (self.net.way(sums.best.way), self.graph.borrow());
         let along = way.project(sums.best.place())[0].clamp(0.0, way.length_m);
         let heading = sums.best.mean[2];
         let forwards = (heading - way.direction).cos() >= 0.0;
         let (edge, along_m) =
-            if forwards { (way.edge, along) } else { (self.graph.edge(way.edge).back, way.length_m - along) };
-        let ends = way.ends.map(|end| self.graph.node(end));
+            if forwards { (way.edge, along) } else { (graph.edge(way.edge).back, way.length_m - along) };
+        let ends = way.ends.map(|end| graph.node(end));
         // A node on stairs is of the floor below, but somebody who has arrived is on that above.
         let near = ends.iter().find(|end| (end.height_m - sums.height_m).abs() < LEVEL_M);
         let low = if ends[0].height_m <= ends[1].height_m { ends[0] } else { ends[1] };

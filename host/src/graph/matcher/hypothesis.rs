@@ -4,7 +4,7 @@ use super::Parameters;
 use super::net::{Net, Way};
 use crate::building::geometry::Point;
 use crate::graph::EdgeKind;
-use nalgebra::{Matrix3, Matrix4, Vector4};
+use nalgebra::{Matrix3, Matrix4, Vector2, Vector4};
 use sohle_shared::step::Step;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -67,6 +67,13 @@ impl Move {
             height_m,
             height_m2: parameters.height_walk_m * parameters.height_walk_m,
         }
+    }
+}
+
+impl Move {
+    /// In the frame before the turn. **Units:** m.
+    pub fn way(&self) -> Vector2<f64> {
+        Vector2::new(self.x, self.y)
     }
 }
 
@@ -259,7 +266,7 @@ impl Moved {
 
 impl Hypothesis {
     /// Kalman's update with one number: `h` times the state differs by `off` from what it should be.
-    fn correct(&mut self, h: Vector4<f64>, off: f64, variance: f64) {
+    pub(super) fn correct(&mut self, h: Vector4<f64>, off: f64, variance: f64) {
         let ph = self.covariance * h;
         let gain = ph / (h.dot(&ph) + variance);
         self.mean += gain * off;

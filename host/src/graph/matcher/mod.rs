@@ -9,6 +9,9 @@
 //! the same place on the same way the likeliest is kept, and those that are hopeless are given up: their number is that of
 //! the places that are possible. When none fits any more, new ones are sown around.
 //!
+//! Positions of other sources weigh and correct the hypotheses too ([`Matcher::sight`]); when several of them in succession say that
+//! somebody is elsewhere, new hypotheses are sown there.
+//!
 //! Nothing is drawn at random: equal steps give equal results. A step costs about a quarter of a millisecond while few places
 //! are possible, whatever the size of the graph: only ways that can have been reached are looked at. From an unknown start
 //! it looks at all ways at first, which takes some 50 microseconds for each directed edge and step, until the first turns
@@ -39,6 +42,7 @@ mod estimate;
 mod hypothesis;
 mod net;
 mod parameters;
+mod sights;
 mod start;
 #[cfg(test)]
 mod tests;
@@ -48,10 +52,13 @@ pub use parameters::Parameters;
 pub use start::{Place, Start};
 
 use super::{EdgeKind, Error, Graph};
+use crate::building::geometry::Point;
 use hypothesis::{Hypothesis, Move, Moved};
 use net::{Net, Reached};
+use sights::Past;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
+use std::borrow::Borrow;
 
 /// Missing steps: how fast somebody may have gone meanwhile, how far in one of them, and how far at most. **Units:** m/s, m.
 const FASTEST_M_S: f64 = 1.5;
@@ -71,9 +78,11 @@ const MERGE_SIGMA_M: f64 = 1.0;
 const MOVES_M: f64 = 0.2;
 
 /// Follows somebody on a graph with several hypotheses.
+///
+/// The graph is borrowed, or shared by who keeps the matcher (`G` is then `Arc<Graph>`).
 #[derive(Clone, Debug)]
-pub struct Matcher<'a> {
-    graph: &'a Graph,
+pub struct Matcher<G> {
+    graph: G,
     parameters: Parameters,
     net: Net,
     hypotheses: Vec<Hypothesis>,
@@ -87,6 +96,7 @@ pub struct Matcher<'a> {
     /// What the best loses in each metre (logarithm of odds).
     loss: f64,
     last: Option<(u32, Micros)>,
+    past: Past,
     estimate: Estimate,
     /// Kept from step to step, so that nothing is allocated.
     work: Work,
@@ -101,20 +111,20 @@ struct Work {
     open: Vec<(super::NodeId, f64, f64)>,
 }
 
-impl<'a> Matcher<'a> {
+impl<G: Borrow<Graph>> Matcher<G> {
     /// Somebody begins.
     ///
     /// # Errors
     /// When a setting is out of its bounds, or the graph has no way on the floor where somebody is to begin.
-    pub fn new(graph: &'a Graph, parameters: &Parameters, start: &Start) -> Result<Self, Error> {
+    pub fn new(graph: G, parameters: &Parameters, start: &Start) -> Result<Self, Error> {
         parameters.check().map_err(Error::Setting)?;
-        let net = Net::of(graph, [parameters.fork, parameters.open_fork]);
+        let net = Net::of(graph.borrow(), [parameters.fork, parameters.open_fork]);
         let mut hypotheses = Vec::new();
         match start {
             Start::Anywhere => hypotheses = start::anywhere(&net, parameters),
             Start::At(places) => {
                 for place in places {
-                    let floor = |way: &net::Way| way.ends.iter().all(|&end| graph.node(end).floor == place.floor);
+                    let floor = |way: &net::Way| way.is_on(place.floor);
                     let begun = start::at(&net, place, floor, parameters);
                     if begun.is_empty() {
                         return Err(Error::NoFloor(place.floor));
@@ -137,6 +147,7 @@ impl<'a> Matcher<'a> {
             turned: false,
             loss: 0.0,
             last: None,
+            past: Past::default(),
             estimate: Estimate::default(),
             work: Work::default(),
         };
@@ -188,6 +199,8 @@ impl<'a> Matcher<'a> {
             self.loss = 0.0;
         }
         self.last = Some((step.index, step.stance_end));
+        self.past.add(step, &by);
+        sown += self.weigh_waiting();
         self.estimate = self.estimated(step.index, sown);
         &self.estimate
     }
@@ -208,6 +221,7 @@ impl<'a> Matcher<'a> {
         let seconds = (step.stance_end - time).max(0) as f64 * 1e-6;
         let far = (FASTEST_M_S * seconds).min(if missing > 0 { MISSING_M * f64::from(missing) } else { f64::INFINITY });
         let far = far.min(FARTHEST_M);
+        self.past.forget();
         for hypothesis in &mut self.hypotheses {
             hypothesis.blur(0.5 * far, MISSING_HEADING);
         }
@@ -273,16 +287,31 @@ impl<'a> Matcher<'a> {
         self.most_now = (p.fewer * self.most_now as f64) as usize;
     }
 
-    /// Sows hypotheses around the best: they look where it looks, or along the way they are on. Tells how many.
+    /// Sows hypotheses around the best. Tells how many.
     fn sow(&mut self, radius_m: f64) -> usize {
-        let Some(best) = self.hypotheses.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).cloned() else { return 0 };
+        let place = self.best().map(Hypothesis::place);
+        place.map_or(0, |place| self.sow_around(place, radius_m, None))
+    }
+
+    fn best(&self) -> Option<&Hypothesis> {
+        self.hypotheses.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))
+    }
+
+    /// Sows hypotheses around a place, on a floor or at the height of the best: they look where it looks, or along the way they
+    /// are on. Tells how many.
+    fn sow_around(&mut self, place: Point, radius_m: f64, floor: Option<i32>) -> usize {
+        let Some(best) = self.best().cloned() else { return 0 };
         let measured = self.with_heights.then_some(self.height_m);
         let height = best.height_m(&self.net, measured);
         let before = self.hypotheses.len();
-        for number in self.net.near(best.place(), radius_m) {
+        for number in self.net.near(place, radius_m) {
             let way = self.net.way(number);
             let [low, high] = way.heights(0.5 * way.length_m);
-            if way.kind == EdgeKind::Elevator || height - high > SAME_HEIGHT_M || low - height > SAME_HEIGHT_M {
+            let there = match floor {
+                Some(floor) => way.is_on(floor),
+                None => height - high <= SAME_HEIGHT_M && low - height <= SAME_HEIGHT_M,
+            };
+            if way.kind == EdgeKind::Elevator || !there {
                 continue;
             }
             let middle = way.at(0.5 * way.length_m);
@@ -291,7 +320,10 @@ impl<'a> Matcher<'a> {
             let looks = start::headings(way).into_iter().chain([(best.mean[2], SOWN_HEADING)]);
             for heading in looks {
                 let mut new = Hypothesis::new(number, (middle, variance), heading, self.parameters.scale);
-                (new.offset_m, new.offset_m2) = (best.offset_m, best.offset_m2);
+                (new.offset_m, new.offset_m2) = match (floor, measured) {
+                    (Some(_), Some(measured)) => (measured - low, self.parameters.height_m.powi(2)),
+                    _ => (best.offset_m, best.offset_m2),
+                };
                 self.hypotheses.push(new);
             }
         }

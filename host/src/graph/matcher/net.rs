@@ -20,8 +20,9 @@ pub(super) struct Way {
     pub height_m: f64,
     pub rise_m: f64,
     pub kind: EdgeKind,
-    /// The nodes at its ends.
+    /// The nodes at its ends, and numbers of their floors.
     pub ends: [NodeId; 2],
+    pub floors: [i32; 2],
     /// Whether nothing else leaves from there.
     pub blind: [bool; 2],
     /// It is part of a net over an open area.
@@ -84,6 +85,7 @@ impl Net {
                 rise_m: edge.rise_m,
                 kind: edge.kind,
                 ends,
+                floors: ends.map(|end| graph.node(end).floor),
                 blind: ends.map(|end| graph.leaving(end).count() == 1),
                 open: edge.kind == EdgeKind::Level && ends.iter().all(|end| degrees[end.index()] >= OPEN_WAYS),
             });
@@ -177,6 +179,11 @@ impl Way {
     /// So far along. **Units:** m.
     pub fn at(&self, along_m: f64) -> Point {
         [self.begin[0] + along_m * self.along[0], self.begin[1] + along_m * self.along[1]]
+    }
+
+    /// Whether it is on a floor from one end to the other.
+    pub fn is_on(&self, floor: i32) -> bool {
+        self.floors == [floor; 2]
     }
 
     /// How far along a place lies, and how far to the left. **Units:** m.

@@ -70,6 +70,8 @@ pub struct Parameters {
     pub sow_m: f64,
     /// All of them together are less likely than the best by this (logarithm of odds).
     pub sown: f64,
+    /// When so many positions of other sources in succession contradict what is known, new ones are sown around the last.
+    pub contradicted: usize,
 }
 
 impl Default for Parameters {
@@ -106,6 +108,7 @@ impl Default for Parameters {
             doubt_over_m: 6.0,
             sow_m: 15.0,
             sown: 4.0,
+            contradicted: 3,
         }
     }
 }
@@ -153,6 +156,7 @@ impl Parameters {
             ("doubt_over_m", self.doubt_over_m, 0.1, 1e3),
             ("sow_m", self.sow_m, 0.0, 1e4),
             ("sown", self.sown, 0.0, 100.0),
+            ("contradicted", self.contradicted as f64, 1.0, 1e6),
         ];
         match bounds.iter().find(|(_, value, low, high)| !(low..=high).contains(&value)) {
             Some((name, value, low, high)) => Err(format!("{name} = {value}: expected {low} to {high}")),

@@ -2,6 +2,7 @@ use super::*;
 use crate::building::geometry::{Point, distance};
 use crate::building::{Node, WalkGraph};
 use crate::graph::EdgeKind;
+use crate::particle::{Seen, Sight};
 use nalgebra::{Matrix4, Vector3};
 use proptest::prelude::*;
 use sohle_shared::sample::ClippedSamples;
@@ -41,7 +42,7 @@ fn at(place: Point, heading: f64) -> Start {
 }
 
 /// Legs straight on after a turn: turns in degrees, lengths in steps of 0.7 m.
-fn walk(matcher: &mut Matcher<'_>, legs: &[(f64, u32)]) -> Vec<Estimate> {
+fn walk(matcher: &mut Matcher<&Graph>, legs: &[(f64, u32)]) -> Vec<Estimate> {
     let mut told = Vec::new();
     for &(turn, steps) in legs {
         for number in 0..steps {
@@ -240,4 +241,109 @@ proptest! {
         }
         prop_assert_eq!(told, follow());
     }
+}
+
+/// Along the lower corridor of the blocks and up the one in the middle, as `(x, y)` after each step of 0.7 m; and the steps.
+fn around_the_corner() -> (Vec<Point>, Vec<Step>) {
+    let legs = [(14_u32, [0.7, 0.0], 0.0), (14, [0.0, 0.7], std::f64::consts::FRAC_PI_2)];
+    let (mut truth, mut steps, mut place) = (Vec::new(), Vec::new(), [0.0, 0.0]);
+    for (count, [x, y], turn) in legs {
+        for number in 0..count {
+            place = [place[0] + x, place[1] + y];
+            truth.push(place);
+            steps.push(step(steps.len() as u32, 0.7, if number == 0 { turn } else { 0.0 }, 0.0));
+        }
+    }
+    (truth, steps)
+}
+
+fn sight_at(place: Point, sigma_m: f64) -> Sight {
+    Sight { seen: Seen::Place(place, nalgebra::Matrix2::identity() * (sigma_m * sigma_m)), floor: None, outlier: 1e-3 }
+}
+
+#[test]
+fn positions_tell_where_somebody_is_whom_the_steps_alone_leave_anywhere() {
+    let graph = blocks();
+    let (truth, steps) = around_the_corner();
+    let follow = |with: bool| {
+        let mut matcher = Matcher::new(&graph, &Parameters::default(), &Start::Anywhere).unwrap();
+        for (index, step) in steps.iter().enumerate() {
+            matcher.step(step);
+            if with && index % 4 == 3 {
+                matcher.sight(&sight_at(truth[index], 1.0), step.stance_end);
+            }
+        }
+        matcher.estimate().clone()
+    };
+    // One turn to the left in a net of blocks tells little.
+    assert!(!follow(false).is_located(), "{}", follow(false));
+    let found = follow(true);
+    assert!(found.is_located() && distance(found.places[0].position, truth[27]) < 0.7, "{found}");
+}
+
+#[test]
+fn a_position_that_comes_late_counts_where_it_was_measured() {
+    let graph = blocks();
+    // Straight on, by steps that are a tenth too long; a position of the sixth metre is heard at the tenth.
+    let steps: Vec<Step> = (0..24).map(|index| step(index, 0.77, 0.0, 0.0)).collect();
+    let end = |heard: Option<Micros>| {
+        let start = Place { floor: 0, place: [0.0, 0.0], sigma_m: 0.2, heading: Some((0.0, 0.1)) };
+        let parameters = Parameters { scale: 0.1, ..Parameters::default() };
+        let mut matcher = Matcher::new(&graph, &parameters, &Start::At(vec![start])).unwrap();
+        for (index, step) in steps.iter().enumerate() {
+            matcher.step(step);
+            if let Some(time) = heard.filter(|_| index == 13) {
+                matcher.sight(&sight_at([5.6, 0.0], 0.1), time);
+            }
+        }
+        matcher.estimate().places[0].position[0]
+    };
+    let truth = 24.0 * 0.7;
+    let [right, wrong, none] = [Some(steps[7].stance_end), Some(steps[13].stance_end), None].map(end);
+    let [right, wrong, none] = [right, wrong, none].map(|end| (end - truth).abs());
+    assert!(right < 0.6 && none > 1.2 && wrong > right + 0.5, "{right} {wrong} {none}");
+}
+
+#[test]
+fn an_outlier_carries_nobody_away_and_several_that_agree_do() {
+    let graph = blocks();
+    let start = at([0.0, 0.0], 0.0);
+    let mut matcher = Matcher::new(&graph, &Parameters::default(), &start).unwrap();
+    let (mut truth, mut told) = ([0.0, 0.0], Vec::new());
+    for index in 0..26 {
+        truth[0] += 0.7;
+        let step = step(index, 0.7, 0.0, 0.0);
+        matcher.step(&step);
+        // One of five is 8 m off.
+        if index % 5 == 2 {
+            let estimate = matcher.sight(&sight_at([truth[0], 8.0], 0.5), step.stance_end);
+            told.push(distance(estimate.places[0].position, truth));
+        } else {
+            matcher.sight(&sight_at(truth, 0.5), step.stance_end);
+        }
+    }
+    assert!(told.iter().all(|&off| off < 0.7), "{told:?}");
+    // Somebody is believed at the wrong end of the corridor above, walking the same way.
+    let mut matcher = Matcher::new(&graph, &Parameters::default(), &at([0.0, 12.0], 0.0)).unwrap();
+    for index in 0..20 {
+        let step = step(index, 0.7, 0.0, 0.0);
+        matcher.step(&step);
+        matcher.sight(&sight_at([0.7 * f64::from(index + 1), 0.0], 0.5), step.stance_end);
+    }
+    let end = matcher.estimate();
+    assert!(distance(end.places[0].position, [14.0, 0.0]) < 1.0 && end.is_located(), "{end}");
+}
+
+#[test]
+fn a_range_says_how_far_and_a_floor_says_which() {
+    let graph = two_floors();
+    let places = [0, 1].map(|floor| Place { floor, place: [8.0, 4.0], sigma_m: 4.0, heading: None });
+    let mut matcher = Matcher::new(&graph, &Parameters::default(), &Start::At(places.to_vec())).unwrap();
+    matcher.step(&step(0, 0.0, 0.0, 0.0));
+    let range = Seen::Range { anchor: [14.0, 0.0], above_m: 0.0, metres: 10.0, sigma_m: 0.1 };
+    let estimate = matcher.sight(&Sight { seen: range, floor: Some(1), outlier: 1e-4 }, Micros(0)).clone();
+    let best = &estimate.places[0];
+    assert!(best.floor == 1 && (distance(best.position, [14.0, 0.0]) - 10.0).abs() < 0.5, "{estimate}");
+    let wrong: f64 = estimate.places.iter().filter(|place| place.floor == 0).map(|place| place.probability).sum();
+    assert!(wrong < 0.01, "{estimate}");
 }
