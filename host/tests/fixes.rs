@@ -225,3 +225,21 @@ fn a_recording_keeps_what_was_said_and_is_replayed_with_it() {
     let recorded = sohle::recording::open(&folder.join("out/recording.mcap"), None).expect("it is a recording");
     assert!(recorded.fixes.len() == 21 && recorded.fixes.iter().all(|fix| &*fix.source == "wifi"));
 }
+
+#[test]
+fn the_matcher_on_the_walk_graph_finds_by_positions_who_starts_anywhere() {
+    let home = prepared(&positions("uwb", 0.0).replace("\"sigma_m\"", "\"floor\":0,\"sigma_m\""));
+    let graph = ["graph", "walk.mcap", "--building", "twin.geojson", "--start", "anywhere"];
+    let with = |options: &[&str]| said(home.path(), &[&graph[..], options].concat()).0;
+    let told = with(&["--fixes", "fixes.jsonl"]);
+    // Rank, per cent, floor, x, y of the likeliest place.
+    let first = told.lines().find_map(|line| line.strip_prefix("1 ")).expect("a place");
+    let cells: Vec<f64> = first.split_whitespace().map(|cell| cell.parse().expect("a number")).collect();
+    assert!(cells[0] > 90.0 && cells[1] == 0.0 && (cells[2] - 28.0).hypot(cells[3] - 7.1) < 1.0, "{told}");
+    assert!(told.contains("located from step") && told.contains("positions of  all  taken"), "{told}");
+    // A straight walk of 24 m is possible on both floors.
+    assert!(with(&[]).contains("never located"), "{}", with(&[]));
+    let refused = sohle(home.path(), &[&graph[..], &["--method", "documented", "--fixes", "fixes.jsonl"]].concat());
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("takes no positions"), "{refused:?}");
+}

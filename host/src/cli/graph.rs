@@ -1,11 +1,15 @@
 //! `sohle graph`: a recorded walk on the walk graph of a building, with several hypotheses or as the graph document does it.
 
+use super::fixes::{self, Source};
 use super::table::Table;
 use super::{Error, print};
 use crate::building::open::{Options, open};
 use crate::building::picture::{self, Trace};
 use crate::building::{Building, geometry::Point};
 use crate::export::{file, png};
+use crate::fixes::line::Clock;
+use crate::fixes::{Fix, Outliers, smoother};
+use crate::follow::sight;
 use crate::graph::Graph;
 use crate::graph::draw::{self, draw};
 use crate::graph::matcher::{self, Estimate, Matcher};
@@ -26,7 +30,8 @@ use std::path::{Path, PathBuf};
     sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164\n  \
     sohle graph eight_walk/ --building 4OG.geojson --start anywhere --explain\n  \
     sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164 --method documented --explain\n  \
-    sohle graph walk.mcap --building buildings/twin.geojson --start 0,26,0.3,90 --barometer --out way")]
+    sohle graph walk.mcap --building buildings/twin.geojson --start 0,26,0.3,90 --barometer --out way\n  \
+    sohle graph walk.mcap --building buildings/twin.geojson --start anywhere --barometer --fixes positions.jsonl")]
 pub struct Args {
     /// The recording, of a phone or of a shoe
     file: PathBuf,
@@ -46,6 +51,10 @@ pub struct Args {
     /// Change floors by the heights that the steps tell (a phone's barometer, a shoe) too; as the document does, by nothing else
     #[arg(long)]
     barometer: bool,
+    /// Positions and ranges of other sources, a JSON object to a line (docs/fixes.md); '-' is the standard input. They come in place
+    /// of those that the recording brings along; the matcher alone hears of them
+    #[arg(long, value_name = "FILE|-")]
+    fixes: Option<Source>,
     /// Print for each step what was decided, and why
     #[arg(long)]
     explain: bool,
@@ -83,10 +92,10 @@ pub fn run(args: Args) -> Result<(), Error> {
 
 /// Follows with several hypotheses. Returns floor and place after each step.
 fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, Point)>, Error> {
-    let is_phone = phone::open::is_phone(&args.file);
+    let walk = Walk::read(&args.file, &phone::Parameters::default())?;
     let parameters = match &args.parameters {
         Some(path) => toml_file::read("settings of the matcher", path)?,
-        None if is_phone => matcher::Parameters::phone(),
+        None if walk.is_phone => matcher::Parameters::phone(),
         None => matcher::Parameters::default(),
     };
     let place = |place: particle::StartPlace| matcher::Place {
@@ -103,8 +112,16 @@ fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, 
     if args.barometer {
         matcher = matcher.with_heights();
     }
+    let settings = if walk.is_phone { smoother::Parameters::phone() } else { smoother::Parameters::default() };
+    let said = (args.fixes.as_ref(), &walk.fixes[..]);
+    let mut incoming = fixes::incoming(said, Some(building), walk.clock, &settings, false)?;
     let (mut places, mut located) = (Vec::new(), None);
-    for step in &steps(&args.file, &phone::Parameters::default())? {
+    for step in &walk.steps {
+        if let Some(incoming) = &mut incoming {
+            incoming.step(step, |observation| {
+                matcher.sight(&sight(observation, &Outliers::default()), observation.time);
+            });
+        }
         let estimate = matcher.step(step);
         if args.explain {
             print(&format!("step {}: {estimate}\n", step.index))?;
@@ -115,6 +132,9 @@ fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, 
         places.extend(estimate.place().map(|place| (place.floor, place.position)));
     }
     print(&found(matcher.estimate(), located))?;
+    if let Some(incoming) = incoming {
+        print(&format!("\n{}", incoming.finish(None)?))?;
+    }
     Ok(places)
 }
 
@@ -137,6 +157,9 @@ const MOST_TOLD: usize = 10;
 
 /// Follows as the document does. Returns floor and place after each step.
 fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, Point)>, Error> {
+    if args.fixes.is_some() {
+        return Err(Error::new("--fixes: the document's tracker takes no positions; expected --method matcher"));
+    }
     let documented = Parameters::documented();
     let parameters = match &args.parameters {
         Some(path) => toml_file::read("settings of the tracker on a graph", path)?,
@@ -166,7 +189,7 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
         tracker = tracker.with_barometer(floors);
     }
     let mut decisions = Vec::new();
-    for step in &steps(&args.file, &phone::Parameters::documented())? {
+    for step in &Walk::read(&args.file, &phone::Parameters::documented())?.steps {
         let rise = f64::from(step.displacement.z);
         let decision = tracker.step(f64::from(step.turn), f64::from(step.length()), rise);
         if args.explain {
@@ -179,13 +202,29 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
     Ok(decisions.iter().map(|decision| (floor_of(decision), decision.place)).collect())
 }
 
-/// The steps of a recording.
-fn steps(file: &Path, phone: &phone::Parameters) -> Result<Vec<Step>, Error> {
-    if phone::open::is_phone(file) {
-        return Ok(phone::steps(&phone::open::open(file)?.samples, phone));
+/// A recorded walk.
+struct Walk {
+    is_phone: bool,
+    steps: Vec<Step>,
+    /// Positions of other sources that the recording brings along.
+    fixes: Vec<Fix>,
+    /// What the times of the steps count from.
+    clock: Clock,
+}
+
+impl Walk {
+    fn read(file: &Path, phone: &phone::Parameters) -> Result<Self, Error> {
+        if phone::open::is_phone(file) {
+            let steps = phone::steps(&phone::open::open(file)?.samples, phone);
+            // The clock of a phone counts from 1970.
+            return Ok(Self { is_phone: true, steps, fixes: Vec::new(), clock: Clock::of_past(Some(0)) });
+        }
+        let recording = recording::open(file, None)?;
+        let track = Track::of(recording.samples.iter().copied(), &sohle_shared::tracker::Parameters::default());
+        let clock = Clock::of_past(recording.began_us());
+        let steps = if recording.samples.is_empty() { recording.steps } else { track.steps };
+        Ok(Self { is_phone: false, steps, fixes: recording.fixes, clock })
     }
-    let recording = recording::open(file, None)?;
-    Ok(Track::of(recording.samples.iter().copied(), &sohle_shared::tracker::Parameters::default()).steps)
 }
 
 /// How often each case was decided, and where the walk ends.

@@ -14,7 +14,7 @@ pub mod demo;
 pub mod endurance;
 mod error;
 pub mod evaluate;
-mod fixes;
+pub mod fixes;
 pub mod graph;
 pub mod line;
 pub mod live;

@@ -1,11 +1,12 @@
 //! What `replay` does with a recording of a phone: its steps go the same way as those of a shoe.
 
 use super::fixes::Source;
-use super::located::{Following, finish_and_tell};
+use super::located::{Following, building, finish_and_tell};
 use super::table::Table;
 use super::{Error, Output, fixes, print};
 use crate::export::picture::{Line, Picture, Placement, Role};
 use crate::export::{self, Named};
+use crate::fixes::Fix;
 use crate::fixes::line::Clock;
 use crate::fixes::smoother;
 use crate::phone::{self, Parameters};
@@ -31,8 +32,8 @@ pub struct Replay<'a> {
 }
 
 impl Replay<'_> {
-    /// Reads, finds the steps, tells and writes.
-    pub fn run(self) -> Result<(), Error> {
+    /// Reads, finds the steps, tells and writes. The positions of other sources that were heard, if there were some.
+    pub fn run(self) -> Result<Option<Vec<Fix>>, Error> {
         let recording = phone::open::open(self.file)?;
         let mut settings = vec![(Role::Chosen, "default", self.parameters)];
         if self.compare {
@@ -68,17 +69,21 @@ impl Replay<'_> {
             print(&format!("{}\n{}\n\n{}\n", picture.title, picture.note, table.text()))?;
             print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;
         }
-        let Some(track) = tracks.first() else { return Ok(()) };
+        let Some(track) = tracks.first() else { return Ok(None) };
         // The clock of a phone counts from 1970.
         let (clock, settings) = (Clock::of_past(Some(0)), smoother::Parameters::phone());
-        let incoming = fixes::incoming((self.fixes, &[]), self.following.as_ref(), clock, &settings, self.quiet)?;
+        let incoming =
+            fixes::incoming((self.fixes, &[]), building(self.following.as_ref()), clock, &settings, self.quiet)?;
+        let heard = incoming.as_ref().map(|incoming| incoming.fixes().to_vec());
         let Some(mut following) = self.following else {
-            return fixes::alone(incoming, &track.steps, &folder, self.quiet);
+            fixes::alone(incoming, &track.steps, &folder, self.quiet)?;
+            return Ok(heard);
         };
         following.hearing(incoming);
         for step in &track.steps {
             following.step(step, None);
         }
-        finish_and_tell(following, None, &folder, self.quiet)
+        finish_and_tell(following, None, &folder, self.quiet)?;
+        Ok(heard)
     }
 }

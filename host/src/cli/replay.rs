@@ -1,17 +1,17 @@
 //! `sohle replay`: a recorded walk, tracked and written; judged if the recording knows the truth.
 
 use super::fixes::{Source, alone, incoming};
-use super::located::{Following, InBuilding, finish_and_tell};
+use super::located::{Following, InBuilding, building, finish_and_tell};
 use super::phone::Replay;
 use super::report::{Report, Settings};
 use super::{Error, Output, convert, parameters, print, shown, window};
 use crate::calibration;
 use crate::fixes::line::Clock;
 use crate::fixes::smoother;
-use crate::recording::live::BEGAN;
 use crate::recording::{self, Profile};
 use crate::{particle, phone, toml_file};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Tracks a recorded walk
 #[derive(Debug, clap::Args)]
@@ -70,9 +70,10 @@ pub fn run(args: Args) -> Result<(), Error> {
         };
         let walk = shown::Walk { phone: chosen.clone(), ..shown::Walk::of(file.clone(), following.as_ref()) };
         let fixes = fixes.as_ref();
-        Replay { file: &file, parameters: chosen, compare, following, fixes, output: &output, quiet }.run()?;
+        let replay = Replay { file: &file, parameters: chosen, compare, following, fixes, output: &output, quiet };
+        let heard = replay.run()?;
         if window::is_wanted(headless, quiet) {
-            window::show(walk);
+            window::show(shown::Walk { fixes: heard.map(Arc::from), ..walk });
         }
         return Ok(());
     }
@@ -95,9 +96,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         print(&format!("{again}\n"))?;
     }
     let folder = output.folder(&stem(&file));
-    let clock = Clock::of_past(recording.metadata.get(BEGAN).and_then(|began| began.parse().ok()));
+    let clock = Clock::of_past(recording.began_us());
     let said = (fixes.as_ref(), &recording.fixes[..]);
-    let mut incoming = incoming(said, following.as_ref(), clock, &smoother::Parameters::default(), quiet)?;
+    let mut incoming = incoming(said, building(following.as_ref()), clock, &smoother::Parameters::default(), quiet)?;
     if let Some(incoming) = incoming.as_ref().filter(|_| fixes.is_some()) {
         recording.fixes = incoming.fixes().to_vec();
     }
@@ -108,6 +109,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         profile,
         tracker: settings.first().map(|settings| settings.parameters).unwrap_or_default(),
         calibration,
+        fixes: fixes.is_some().then(|| recording.fixes.as_slice().into()),
         ..shown::Walk::of(file, following.as_ref())
     };
     let recording = Report {

@@ -12,7 +12,6 @@ use crate::export::geojson::Origin;
 use crate::export::picture::{Dot, Line, Picture, Placement, Role};
 use crate::export::{self, Named, file};
 use crate::follow::Orders;
-use crate::recording::live::BEGAN;
 use crate::recording::{Recording, SimulatedTruth, mcap};
 use crate::track::{Steer, Track};
 use indicatif::ProgressIterator;
@@ -143,7 +142,7 @@ fn outcome(
     let bar = progress(recording.samples.len() as u64, &format!("tracking ({})", settings.label), quiet);
     let begun = Instant::now();
     let correct = |sample: &ImuSample| calibration.map_or(*sample, |calibration| calibration.apply(sample, None));
-    let began_us = recording.metadata.get(BEGAN).and_then(|text| text.parse().ok());
+    let began_us = recording.began_us();
     let mut steering = Steering { recorded: &recording.orders, orders: Orders::default(), following, began_us };
     let track = if recording.samples.is_empty() {
         recording.steps.iter().for_each(|step| _ = steering.after(step));

@@ -4,6 +4,7 @@ use super::Error;
 use super::live::{Listening, Show};
 use super::located::Following;
 use crate::building::Building;
+use crate::fixes::Fix;
 use crate::link::Address;
 use crate::recording::Profile;
 use crate::{follow, phone};
@@ -25,6 +26,8 @@ pub struct Walk {
     pub phone: phone::Parameters,
     /// What the samples are corrected by.
     pub calibration: Option<Calibration>,
+    /// Positions of other sources that were heard, if not those of the recording.
+    pub fixes: Option<Arc<[Fix]>>,
     /// The building, and how it was followed in.
     pub place: Option<(Arc<Building>, follow::Settings)>,
 }

@@ -2,7 +2,7 @@
 
 use super::shown::{Enough, Shoe, Walk, Watched};
 use super::table::Table;
-use super::{Error, print, progress};
+use super::{Error, fixes, print, progress};
 use crate::building::generate;
 use crate::export::file;
 use crate::follow;
@@ -10,14 +10,14 @@ use crate::link::Address;
 use crate::recording::Profile;
 use crate::window::engine::live::{End, Live};
 use crate::window::engine::walk::Settings;
-use crate::window::engine::{Opening, Plan, Source, What};
+use crate::window::engine::{Opening, Plan, Positions, Source, What};
 use crate::window::gpu::offscreen::{Sheet, Studio};
 use crate::window::layout::{View, usual_file};
 use crate::window::map::measure::measure as map_frames;
 use crate::window::run::First;
 use crate::window::shoes::PATIENCE;
 use crate::window::{measure, picture, run, saving};
-use crate::{calibration, particle, phone, toml_file};
+use crate::{calibration, particle, toml_file};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
@@ -55,6 +55,10 @@ pub struct Args {
     /// What 'sohle calibrate' found of the sensor; every sample is corrected by it before it is tracked
     #[arg(long, value_name = "FILE.toml", requires = "what")]
     calibration: Option<PathBuf>,
+    /// Positions and ranges of other sources, a JSON object to a line (docs/fixes.md): of a file or the standard input, of a
+    /// shoe by datagrams to HOST:PORT too; they come in place of those that a recording brings along
+    #[arg(long, value_name = "FILE|-|udp:HOST:PORT", requires = "what")]
+    fixes: Option<fixes::Source>,
     /// Keeps where the views are in this file instead of the user's own; 'none' keeps nothing
     #[arg(long, value_name = "FILE.json|none")]
     layout: Option<PathBuf>,
@@ -104,6 +108,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         None if args.picture.is_some() => None,
         None => usual_file(),
     };
+    if args.fixes.is_some() && args.what.len() > 1 {
+        return Err(Error::new("--fixes says where one person is; expected one recording or one shoe"));
+    }
     let openings = args.what.iter().map(|what| opening(&args, what)).collect::<Result<Vec<_>, _>>()?;
     let Some(path) = args.picture else {
         let duration = match args.duration {
@@ -129,10 +136,17 @@ pub fn is_wanted(headless: bool, quiet: bool) -> bool {
 
 /// Shows a walk whose results are written. Without a window the results are still there.
 pub fn show(walk: Walk) {
-    let Walk { file, profile, tracker, phone, calibration, place } = walk;
+    let Walk { file, profile, tracker, phone, calibration, fixes, place } = walk;
     let (plan, follow) = place.unzip();
-    let settings = Settings { tracker, follow: follow.unwrap_or_default(), calibration };
-    let opening = Opening { what: What::Recording(file), profile, building: plan.map(Plan::Read), settings, phone };
+    let settings = Settings { tracker, follow: follow.unwrap_or_default(), calibration, ..Settings::default() };
+    let opening = Opening {
+        profile,
+        building: plan.map(Plan::Read),
+        settings,
+        phone,
+        positions: fixes.map(Positions::Read),
+        ..Opening::of(What::Recording(file))
+    };
     if let Err(error) = run::window(vec![First::Opening(Box::new(opening))], usual_file(), None) {
         eprintln!("{error}");
     }
@@ -222,10 +236,12 @@ fn opening(args: &Args, what: &str) -> Result<Opening, Error> {
             ..usual
         },
         calibration: args.calibration.as_deref().map(calibration::read).transpose()?,
+        ..Settings::default()
     };
     let profile = args.profile.as_deref().map(Profile::parse).transpose()?;
     let building = args.building.clone().map(Plan::File);
-    Ok(Opening { what, profile, building, settings, phone: phone::Parameters::default() })
+    let positions = args.fixes.clone().map(Positions::From);
+    Ok(Opening { profile, building, settings, positions, ..Opening::of(what) })
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ pub struct Arrived {
 }
 
 /// Takes lines in, and counts.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Intake {
     frames: Option<Frames>,
     tallies: BTreeMap<Arc<str>, Tally>,

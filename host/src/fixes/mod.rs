@@ -7,7 +7,8 @@
 //! document's three methods are [`kalman`], [`extended`] and [`adjustment`]; [`smoother`] is the better one. Each is a
 //! [`Method`] and takes the same steps and observations.
 //!
-//! [`line`](mod@line) is a fix as a line of JSON, [`intake`] where such lines come in and are counted.
+//! [`line`](mod@line) is a fix as a line of JSON, [`intake`] where such lines come in and are counted, [`fusion`] what puts them
+//! together with the steps as both come.
 //!
 //! # Frame
 //! The building's: x east, y north, in metres; directions counter-clockwise from east.
@@ -20,6 +21,7 @@ mod aligner;
 mod beginning;
 pub mod extended;
 pub mod fix;
+pub mod fusion;
 pub mod intake;
 pub mod kalman;
 pub mod line;
@@ -31,6 +33,7 @@ pub mod polar;
 pub mod smoother;
 
 pub use fix::{Fix, Frame, Measured};
+pub use fusion::Fusion;
 pub use intake::Intake;
 pub use method::{Estimate, Method, Start};
 pub use observation::{Frames, Observation, Refused};

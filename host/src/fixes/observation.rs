@@ -102,11 +102,11 @@ impl Refused {
 }
 
 /// Turns fixes of any frame into observations of one building.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Frames {
     georeference: Georeference,
-    /// From longitude and latitude into the building.
-    earth: Option<Projection>,
+    /// From longitude and latitude into the building. Shared, since moments of a walk are kept.
+    earth: Option<Arc<Projection>>,
     /// Numbers of the floors; nothing where there is no building.
     floors: Option<Vec<i32>>,
 }
@@ -126,7 +126,7 @@ impl Frames {
     /// # Errors
     /// As [`Georeference::projection`].
     pub fn at(georeference: Georeference) -> Result<Self, crate::building::Error> {
-        Ok(Self { georeference, earth: georeference.projection()?, ..Self::default() })
+        Ok(Self { georeference, earth: georeference.projection()?.map(Arc::new), ..Self::default() })
     }
 
     /// The fix in the frame of the building.

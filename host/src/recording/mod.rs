@@ -115,6 +115,11 @@ impl Recording {
         self.truth.as_ref().filter(|truth| there && !truth.poses.is_empty())
     }
 
+    /// When the clock of its times was zero, if that is known. **Units:** microseconds since the beginning of 1970.
+    pub fn began_us(&self) -> Option<i64> {
+        self.metadata.get(live::BEGAN).and_then(|began| began.parse().ok())
+    }
+
     /// Usual number of samples in a second. **Units:** Hz; 0 with fewer than two moments.
     pub fn rate_hz(&self) -> f64 {
         table::usual_period(&self.samples).map_or(0.0, |period| 1.0 / period)

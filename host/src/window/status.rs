@@ -78,9 +78,9 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, latency: Option<Latency>) {
                 ],
             );
         }
-        if let Some(decided) = &snapshot.on_graph {
+        for (which, decided) in &snapshot.others {
             ui.separator();
-            ui.label(RichText::new("on the graph").strong());
+            ui.label(RichText::new(which.word()).strong());
             ui.add(egui::Label::new(RichText::new(decided).small()).wrap());
         }
         if let Some(link) = &snapshot.link {

@@ -1,12 +1,14 @@
 //! Every control of the window, as those know it who cannot see it, and the window as a whole.
 
-use super::engine::{Command, Kind, Opening, Plan, What};
+use super::engine::{Beside, Command, Kind, Opening, Plan, Positions, What};
 use super::gpu::offscreen::{self, Sheet};
 use super::layout::{Layout, View};
-use super::map::{self, Projection, Role};
+use super::map::{self, Projection, Role as Drawn};
 use super::{App, picture};
 use crate::building::{geojson, route};
+use crate::cli::fixes::Source;
 use crate::simulation::{Route, Scenario, SensorModel, output};
+use eframe::egui::accesskit::Role;
 use eframe::egui::{Key, Modifiers};
 use egui_dock::DockState;
 use egui_kittest::Harness;
@@ -158,18 +160,63 @@ fn settings_of_the_particle_filter_apply_at_once_too() {
 fn the_walk_graph_is_followed_on_when_that_is_asked_for() {
     let home = tempfile::tempdir().unwrap();
     let mut window = playing(&home);
-    window.get_by_label("On the graph").click();
-    until(&mut window, |app| app.snapshot().on_graph.is_some());
-    window.key_press(Key::End);
-    let way = |app: &App| {
+    // Nothing else says where somebody is.
+    choose(&mut window, Beside::Positions, |app| !app.snapshot().positions);
+    let ways = |app: &App, which: Beside| {
         let tracks = &app.snapshot().overlay.tracks;
-        tracks.iter().find(|track| track.role == Role::Other).map_or(0, |track| track.pieces[0].len())
+        tracks.iter().find(|track| track.name == which.word()).map_or(0, |track| track.pieces[0].len())
     };
-    until(&mut window, |app| app.snapshot().computing.is_none() && way(app) > 1);
+    let runs = |app: &App, which: Beside| app.snapshot().others.iter().any(|(running, _)| *running == which);
+    for which in [Beside::Documented, Beside::Matcher] {
+        choose(&mut window, which, |app| runs(app, which));
+    }
+    window.key_press(Key::End);
+    until(&mut window, |app| {
+        app.snapshot().computing.is_none() && ways(app, Beside::Documented) > 1 && ways(app, Beside::Matcher) > 1
+    });
     // What was decided at the last step, and where that leaves somebody.
     assert!(window.query_all_by_label_contains(", delta ").next().is_some());
-    window.get_by_label("On the graph").click();
-    until(&mut window, |app| app.snapshot().on_graph.is_none() && way(app) == 0);
+    assert!(window.query_all_by_label_contains(" hypotheses, loss ").next().is_some());
+    choose(&mut window, Beside::Documented, |app| !runs(app, Beside::Documented) && ways(app, Beside::Documented) == 0);
+    assert!(runs(window.state(), Beside::Matcher));
+}
+
+/// Opens the menu of other methods, clicks one and closes it.
+fn choose(window: &mut Harness<'static, App>, which: Beside, until_is: impl Fn(&App) -> bool) {
+    window.get_by_label("Methods").click();
+    window.run_steps(2);
+    window.get_by_role_and_label(Role::CheckBox, which.word()).click();
+    until(window, until_is);
+    window.key_press(Key::Escape);
+    window.run_steps(2);
+}
+
+#[test]
+fn positions_are_drawn_with_the_path_that_steps_and_they_give() {
+    let home = tempfile::tempdir().unwrap();
+    let path = recording(&home);
+    let lines: String = (2..20)
+        .map(|second| format!("{{\"time_us\":{second}000000,\"position\":[14.0,6.0],\"sigma_m\":15}}\n"))
+        .collect();
+    let fixes = home.path().join("fixes.jsonl");
+    std::fs::write(&fixes, lines + "no JSON\n").unwrap();
+    let mut window = window(None);
+    let context = window.ctx.clone();
+    let mut opening = Opening::of(What::Recording(path));
+    opening.positions = Some(Positions::From(Source::File(fixes)));
+    opening.building = Some(Plan::File(TWIN.into()));
+    opening.settings.follow.start = "W02".into();
+    window.state_mut().open(opening, &context, false);
+    until(&mut window, |app| app.snapshot().kind == Kind::Replay && app.snapshot().positions);
+    window.key_press(Key::End);
+    let pieces = |app: &App, name: &str| {
+        let tracks = &app.snapshot().overlay.tracks;
+        tracks.iter().find(|track| track.name == name).map(|track| track.pieces.len())
+    };
+    // Each position is a cross of two strokes.
+    until(&mut window, |app| pieces(app, "positions") == Some(36) && pieces(app, Beside::Positions.word()) == Some(1));
+    assert!(window.query_all_by_label_contains(" by 18 positions").next().is_some());
+    choose(&mut window, Beside::Positions, |app| pieces(app, "positions").is_none());
 }
 
 #[test]
@@ -192,7 +239,7 @@ fn several_are_shown_each_in_its_colour_and_one_is_selected() {
     assert_eq!((both.clouds.len(), both.people.len()), (2, 2));
     assert!(both.clouds[0].colour.is_some() && both.clouds[0].colour != both.clouds[1].colour);
     assert_eq!(both.people.iter().map(|person| person.selected).collect::<Vec<_>>(), [false, true]);
-    let estimates = both.tracks.iter().filter(|track| track.role == Role::Estimate).count();
+    let estimates = both.tracks.iter().filter(|track| track.role == Drawn::Estimate).count();
     assert!(estimates == 2 && both.tracks.len() > 2, "the selected one has all its ways");
     // What did not change is not made anew.
     let (_, again) = window.state_mut().shoes().drawing();

@@ -1,7 +1,8 @@
 //! The buttons above, and the bar below with which one goes through a recording.
 
-use super::engine::{Command, Kind, Snapshot};
-use eframe::egui::{self, Button, ComboBox, ProgressBar, RichText, Slider, Ui};
+use super::engine::{Beside, Command, Kind, Snapshot};
+use eframe::egui::containers::menu::{MenuButton, MenuConfig};
+use eframe::egui::{self, Button, ComboBox, PopupCloseBehavior, ProgressBar, RichText, Slider, Ui};
 
 /// How fast a recording can be played; the last is as fast as it can be computed.
 const SPEEDS: [f64; 8] = [0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0, f64::INFINITY];
@@ -51,14 +52,7 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) -> Ve
             }
         }
         ui.separator();
-        let mut on_graph = snapshot.on_graph.is_some();
-        let told = "Follows on the walk graph of the building too, as the graph document does it";
-        let enabled = snapshot.whereabouts.is_some();
-        ui.add_enabled_ui(enabled, |ui| {
-            if ui.toggle_value(&mut on_graph, "On the graph").on_hover_text(told).changed() {
-                commands.push(Command::OnGraph(on_graph));
-            }
-        });
+        others(ui, snapshot, commands);
         ui.separator();
         own(ui, &mut asked, open, "Export track", "Writes the path into a file", Asked::Track);
         own(ui, &mut asked, true, "Export picture", "Writes a picture of the window", Asked::Picture);
@@ -69,6 +63,26 @@ pub fn show(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) -> Ve
         ui.label(RichText::new(&snapshot.name).weak());
     });
     asked
+}
+
+/// Which other methods follow too.
+fn others(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) {
+    let possible = |which: &Beside| if which.on_graph() { snapshot.whereabouts.is_some() } else { snapshot.positions };
+    ui.add_enabled_ui(Beside::ALL.iter().any(possible), |ui| {
+        let menu = MenuButton::new("Methods")
+            .config(MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside));
+        let (button, _) = menu.ui(ui, |ui| {
+            for which in Beside::ALL {
+                let mut on = snapshot.others.iter().any(|(running, _)| *running == which);
+                ui.add_enabled_ui(possible(&which), |ui| {
+                    if ui.checkbox(&mut on, which.word()).on_hover_text(which.told()).changed() {
+                        commands.push(Command::Beside(which, on));
+                    }
+                });
+            }
+        });
+        button.on_hover_text("Follows by other methods too, to compare");
+    });
 }
 
 fn own(ui: &mut Ui, asked: &mut Vec<Asked>, enabled: bool, word: &str, told: &str, what: Asked) {

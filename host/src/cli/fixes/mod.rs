@@ -6,48 +6,36 @@ mod summary;
 
 pub use source::{Source, Stream};
 
-use super::located::Following;
 use super::{Error, print};
 use crate::building::Building;
 use crate::building::georeference::Projection;
-use crate::fixes::intake::Arrived;
 use crate::fixes::line::Clock;
-use crate::fixes::{Estimate, Fix, Intake, Method, Observation, Outcome, Smoother, Start, smoother};
+use crate::fixes::{Estimate, Fix, Fusion, Observation, Outcome, smoother};
 use serde_json::{Value as Json, json};
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
-use std::collections::VecDeque;
 use std::path::Path;
 
 /// So many messages of a kind are told one by one.
 const MOST_TOLD: usize = 10;
-/// A place that is known no better (root of the sum of the variances) is none. **Units:** m.
-const KNOWN_M: f64 = 10.0;
 
-/// Fixes that come in while steps are gone through, and the smoother that takes both.
+/// Fixes that come in while steps are gone through, put together with them; what is wrong with them is told.
 pub struct Incoming {
-    intake: Intake,
-    /// What will be heard later, in the order of arrival.
-    waiting: VecDeque<Arrived>,
-    smoother: Smoother,
+    fusion: Fusion,
     /// All that was said, in the order of the lines.
     fixes: Vec<Fix>,
-    /// The place as it was said after each step.
-    said: Vec<Estimate>,
     told: usize,
     quiet: bool,
 }
 
-/// Those of `source`, if one is given, or else those of a recording, if it has some; in the frame of the building where somebody is
-/// followed.
+/// Those of `source`, if one is given, or else those of a recording, if it has some; in the frame of the building, if there is one.
 pub fn incoming(
     (source, recorded): (Option<&Source>, &[Fix]),
-    following: Option<&Following>,
+    building: Option<&Building>,
     clock: Clock,
     parameters: &smoother::Parameters,
     quiet: bool,
 ) -> Result<Option<Incoming>, Error> {
-    let building = following.map(|following| &**following.follower().building());
     let new = || Incoming::new(building, parameters, quiet);
     match source {
         Some(source) => {
@@ -75,19 +63,11 @@ pub fn alone(incoming: Option<Incoming>, steps: &[Step], folder: &Path, quiet: b
 impl Incoming {
     /// Nothing has come, and nothing is known of the start.
     pub fn new(building: Option<&Building>, parameters: &smoother::Parameters, quiet: bool) -> Result<Self, Error> {
-        Ok(Self {
-            intake: Intake::new(building)?,
-            waiting: VecDeque::new(),
-            smoother: Smoother::new(parameters, &Start::default()),
-            fixes: Vec::new(),
-            said: Vec::new(),
-            told: 0,
-            quiet,
-        })
+        Ok(Self { fusion: Fusion::new(building, parameters)?, fixes: Vec::new(), told: 0, quiet })
     }
 
     /// Reads all lines.
-    fn read(&mut self, source: &Source, clock: Clock) -> Result<(), Error> {
+    pub fn read(&mut self, source: &Source, clock: Clock) -> Result<(), Error> {
         for (index, line) in source.text()?.lines().enumerate() {
             if let Some(fix) = self.line(line, &format!("{source}, line {}", index + 1), clock) {
                 self.fixes.push(fix);
@@ -101,7 +81,7 @@ impl Incoming {
         if line.trim().is_empty() {
             return None;
         }
-        match self.intake.line(line, clock) {
+        match self.fusion.line(line, clock) {
             Ok(fix) => {
                 self.take(&fix, name);
                 Some(fix)
@@ -115,12 +95,8 @@ impl Incoming {
 
     /// Keeps a fix until it is its turn, unless it is of no use.
     fn take(&mut self, fix: &Fix, name: &str) {
-        match self.intake.admit(fix) {
-            Ok(arrived) => {
-                let after = self.waiting.partition_point(|other| other.time <= arrived.time);
-                self.waiting.insert(after, arrived);
-            }
-            Err(why) => self.tell(&format!("{name}: {}: {why}", fix.source)),
+        if let Err(why) = self.fusion.take(fix) {
+            self.tell(&format!("{name}: {}: {why}", fix.source));
         }
     }
 
@@ -142,19 +118,18 @@ impl Incoming {
 
     /// Hears all that has arrived before a time; the observations go to `also` too.
     pub fn hear(&mut self, until: Micros, mut also: impl FnMut(&Observation)) {
-        while self.waiting.front().is_some_and(|arrived| arrived.time < until) {
-            let Some(Arrived { observation, .. }) = self.waiting.pop_front() else { break };
-            let verdict = self.smoother.hear(&observation);
-            if verdict.outcome != Outcome::Taken {
-                self.tell(&format!("{:.1} s: {verdict}", observation.time.as_seconds()));
+        while let Some(heard) = self.fusion.hear(until) {
+            let time = heard.observation.time.as_seconds();
+            if heard.verdict.outcome != Outcome::Taken {
+                self.tell(&format!("{time:.1} s: {}", heard.verdict));
             }
-            if let Some(contradiction) = self.intake.judged(&observation, &verdict)
+            if let Some(contradiction) = &heard.contradiction
                 && !self.quiet
             {
-                eprintln!("{:.1} s: {contradiction}", observation.time.as_seconds());
+                eprintln!("{time:.1} s: {contradiction}");
             }
-            if !matches!(verdict.outcome, Outcome::TooLate(_) | Outcome::TooEarly(_)) {
-                also(&observation);
+            if heard.counts() {
+                also(&heard.observation);
             }
         }
     }
@@ -162,18 +137,22 @@ impl Incoming {
     /// Takes in a step, after all that arrived until its end; the latter go to `also` too.
     pub fn step(&mut self, step: &Step, also: impl FnMut(&Observation)) {
         self.hear(step.stance_end + 1, also);
-        self.smoother.step(step);
-        self.said.extend(self.smoother.estimate());
+        self.fusion.step(step);
+    }
+
+    /// Steps and positions together.
+    pub fn fusion(&self) -> &Fusion {
+        &self.fusion
     }
 
     /// Where steps and positions say that somebody is now, if they know.
     pub fn estimate(&self) -> Option<Estimate> {
-        self.smoother.estimate().filter(|estimate| estimate.sigma_m() < KNOWN_M)
+        self.fusion.estimate()
     }
 
     /// The same for programs.
     pub fn object(&self, projection: Option<&Projection>) -> Option<Json> {
-        let (estimate, found) = (self.estimate()?, self.smoother.calibration()?);
+        let (estimate, found) = (self.estimate()?, self.fusion.smoother().calibration()?);
         let c = estimate.covariance;
         let lon_lat = projection.and_then(|projection| projection.to_earth(estimate.place).ok());
         Some(json!({

@@ -22,13 +22,13 @@ impl Incoming {
             let sigma = sigma.map_or_else(String::new, |sigma| format!("{sigma:.3}"));
             let _ = writeln!(text, "{kind},{time:.3},{x:.3},{y:.3},{sigma}");
         };
-        for said in &self.said {
+        for said in self.fusion.said() {
             row("said", said.time.as_seconds(), said.place, Some(said.sigma_m()));
         }
-        for settled in self.smoother.take_settled() {
+        for settled in self.fusion.smoother_mut().take_settled() {
             row("corrected", settled.time.as_seconds(), settled.place, None);
         }
-        for open in self.smoother.open_part() {
+        for open in self.fusion.smoother().open_part() {
             row("corrected", open.time.as_seconds(), open.place, Some(open.sigma_m()));
         }
         file::write(&folder.join(PATH), text.as_bytes())?;
@@ -38,7 +38,7 @@ impl Incoming {
     /// What became of the fixes, and what they told of the steps.
     fn summary(&self) -> String {
         let mut table = Table::new("positions of", &["all", "taken", "doubted", "too late", "refused", "because"]);
-        for (source, tally) in self.intake.tallies() {
+        for (source, tally) in self.fusion.intake().tallies() {
             let refused: usize = tally.refused.values().sum();
             let why: Vec<_> = tally.refused.iter().map(|(why, count)| format!("{why} {count}")).collect();
             let counts = [tally.count(), tally.taken, tally.doubted, tally.out_of_time, refused];
@@ -47,13 +47,14 @@ impl Incoming {
             table.row(source.to_string(), cells);
         }
         let mut text = table.text();
-        if self.intake.spoilt() > 0 {
-            let _ = writeln!(text, "{} lines were no fixes", self.intake.spoilt());
+        if self.fusion.intake().spoilt() > 0 {
+            let _ = writeln!(text, "{} lines were no fixes", self.fusion.intake().spoilt());
         }
-        if !self.waiting.is_empty() {
-            let _ = writeln!(text, "{} came after the last step", self.waiting.len());
+        if self.fusion.waiting() > 0 {
+            let _ = writeln!(text, "{} came after the last step", self.fusion.waiting());
         }
-        if let (Some(estimate), Some(found)) = (self.smoother.estimate(), self.smoother.calibration()) {
+        let smoother = self.fusion.smoother();
+        if let (Some(estimate), Some(found)) = (smoother.estimate(), smoother.calibration()) {
             let [x, y] = estimate.place;
             let _ = writeln!(
                 text,
@@ -73,7 +74,7 @@ impl Incoming {
 
     /// What became of the fixes and what is known now, for programs.
     pub fn counts(&self) -> Json {
-        let sources = self.intake.tallies().iter().map(|(source, tally)| {
+        let sources = self.fusion.intake().tallies().iter().map(|(source, tally)| {
             let counts = json!({
                 "all": tally.count(), "taken": tally.taken, "doubted": tally.doubted, "out_of_time": tally.out_of_time,
                 "refused": tally.refused,
@@ -81,8 +82,8 @@ impl Incoming {
             (source.to_string(), counts)
         });
         json!({
-            "sources": sources.collect::<Map<_, _>>(), "no_fixes": self.intake.spoilt(),
-            "contradicting": self.intake.contradicting(), "at_end": self.object(None),
+            "sources": sources.collect::<Map<_, _>>(), "no_fixes": self.fusion.intake().spoilt(),
+            "contradicting": self.fusion.intake().contradicting(), "at_end": self.object(None),
         })
     }
 }

@@ -3,6 +3,7 @@
 use crate::cli::fixes::Incoming;
 use crate::cli::located::{Answer, Following, InBuilding};
 use crate::cli::{Error, live::words};
+use crate::fixes::Fusion;
 use crate::follow::{self, Follower, mode_word, scene};
 use crate::link::Connection;
 use crate::link::ground::ShoeMode;
@@ -68,6 +69,11 @@ impl Places {
     /// The positions of other sources.
     pub fn incoming(&mut self) -> Option<&mut Incoming> {
         self.following.incoming()
+    }
+
+    /// Steps and positions together.
+    pub fn fusion(&self) -> Option<&Fusion> {
+        self.following.fusion()
     }
 
     /// Hears what has arrived before a time by the clock of the shoe.

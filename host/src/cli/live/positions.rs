@@ -5,7 +5,7 @@ use super::words;
 use crate::cli::Error;
 use crate::cli::fixes::{Incoming, Source, Stream};
 use crate::fixes::line::Clock;
-use crate::fixes::{Fix, smoother};
+use crate::fixes::{Fix, Fusion, smoother};
 use crate::link::Connection;
 use serde_json::{Value as Json, json};
 use sohle_shared::step::Step;
@@ -76,6 +76,11 @@ impl Positions {
             }
         }
         fixes
+    }
+
+    /// Steps and positions together, where no building is.
+    pub fn fusion(&self) -> Option<&Fusion> {
+        self.alone.as_ref().map(Incoming::fusion)
     }
 
     /// Takes in a step, where no building is.

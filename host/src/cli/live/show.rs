@@ -4,6 +4,7 @@ use super::places::{Places, Told};
 use super::positions::Positions;
 use super::{Args, Format, words};
 use crate::cli::{Error, print};
+use crate::fixes::Fusion;
 use crate::link::Connection;
 use crate::link::connection::Happening;
 use crate::link::event::{Event, mismatch};
@@ -80,8 +81,14 @@ impl Show {
 
     /// Says nothing, and records nothing yet. `opened_us` is when the connection was begun, in microseconds since the
     /// beginning of 1970.
-    pub fn silent(places: Option<Places>, opened_us: i64) -> Self {
-        Self { places, opened_us, quiet: true, ..Self::default() }
+    pub fn silent((places, positions): (Option<Places>, Option<Positions>), opened_us: i64) -> Self {
+        Self { places, positions, opened_us, quiet: true, ..Self::default() }
+    }
+
+    /// Steps and positions of other sources together, if there are some.
+    pub fn fusion(&self) -> Option<&Fusion> {
+        let places = self.places.as_ref().and_then(Places::fusion);
+        places.or_else(|| self.positions.as_ref().and_then(Positions::fusion))
     }
 
     /// Begins to record, in the midst of what is said: `heard` is what the recording begins with.

@@ -2,11 +2,12 @@
 
 use super::outputs::{Outputs, Wanted, walk};
 use super::{picture, summary};
+use crate::building::Building;
 use crate::building::georeference::Projection;
 use crate::cli::fixes::Incoming;
 use crate::cli::{Error, print};
 use crate::export::{file, png};
-use crate::fixes;
+use crate::fixes::{self, Fusion};
 use crate::follow::{self, Follower, LONGEST_STEP_M, Said, Unusual, scene};
 use crate::particle::State;
 use crate::recording::Recording;
@@ -40,6 +41,11 @@ impl Answer {
             Self::Positions(_) => "positions",
         }
     }
+}
+
+/// Where somebody is followed, if anybody is.
+pub fn building(following: Option<&Following>) -> Option<&Building> {
+    following.map(|following| &**following.follower().building())
 }
 
 /// A follower and its outputs.
@@ -80,6 +86,11 @@ impl Following {
     /// The positions of other sources.
     pub fn incoming(&mut self) -> Option<&mut Incoming> {
         self.incoming.as_mut()
+    }
+
+    /// Steps and positions together.
+    pub fn fusion(&self) -> Option<&Fusion> {
+        self.incoming.as_ref().map(Incoming::fusion)
     }
 
     /// Hears the positions that have arrived before a time.

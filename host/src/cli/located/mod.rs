@@ -5,7 +5,7 @@ mod outputs;
 mod picture;
 mod summary;
 
-pub use following::{Answer, Following, finish_and_tell};
+pub use following::{Answer, Following, building, finish_and_tell};
 pub use outputs::{Wanted, walk};
 
 use super::Error;

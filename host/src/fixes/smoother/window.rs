@@ -94,6 +94,11 @@ pub struct Smoother {
 }
 
 impl Smoother {
+    /// Its settings.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
     /// Begins; whatever is not known of the start is found out.
     pub fn new(parameters: &Parameters, start: &Start) -> Self {
         let mut sigmas =

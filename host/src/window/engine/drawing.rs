@@ -1,13 +1,12 @@
 //! What is drawn of somebody who is followed.
 
-use super::on_graph::OnGraph;
-use super::walk::{Anchor, Moment};
+use super::beside::{Beside, Followed, Others};
+use super::walk::Moment;
 use crate::building::Building;
 use crate::follow::{Follower, runs};
 use crate::graph;
 use crate::particle::{Particle, State};
 use crate::recording::Recording;
-use crate::track::Track as Steps;
 use crate::window::map::{Cloud, Overlay, Person, Role, Track};
 use std::sync::Arc;
 
@@ -18,10 +17,8 @@ const THINNING: usize = 10;
 #[derive(Debug, Default)]
 pub struct Drawing {
     truth: Option<Track>,
-    /// Who follows on the walk graph, and whether lengths of steps are measured.
-    on_graph: Option<(OnGraph, bool)>,
-    /// What was decided there.
-    decided: String,
+    /// Who else follows.
+    others: Others,
     /// What was drawn after so many steps, and for which start.
     stepped: Option<(usize, usize, Overlay)>,
 }
@@ -36,59 +33,51 @@ impl Drawing {
         Self { truth, ..Self::default() }
     }
 
-    /// Follows on the walk graph of a building too; without one, no longer. `measured`: lengths of steps are measured, not
-    /// guessed.
+    /// Follows by another method too, or no longer. `measured`: lengths of steps are measured, not guessed.
     ///
     /// # Errors
-    /// As [`OnGraph::of`]. Nothing changes then.
-    pub fn follow_on(&mut self, building: Option<&Building>, measured: bool) -> Result<(), graph::Error> {
-        let on_graph = building.map(OnGraph::of).transpose()?;
-        self.on_graph = on_graph.map(|on_graph| (on_graph, measured));
+    /// As [`Others::run`]. Nothing changes then.
+    pub fn beside(
+        &mut self,
+        which: Beside,
+        on: bool,
+        building: Option<&Building>,
+        measured: bool,
+    ) -> Result<(), graph::Error> {
+        self.others.run(which, on, building, measured)?;
         self.stepped = None;
         Ok(())
     }
 
-    /// What was decided at the last step on the walk graph, if one is followed on.
-    pub fn decided(&self) -> Option<String> {
-        self.on_graph.as_ref().map(|_| self.decided.clone())
+    /// Other methods that follow too, and what each decided at the last step.
+    pub fn others(&self) -> Vec<(Beside, String)> {
+        self.others.running()
     }
 
     /// Draws a moment of a walk. `epoch` is another number whenever it is another walk.
     pub fn moment(&mut self, moment: &Moment, epoch: usize) -> Overlay {
-        self.draw(&moment.track, moment.follower.as_ref(), moment.anchor.as_ref(), moment.foot(), epoch)
+        let followed = Followed {
+            steps: &moment.track,
+            follower: moment.follower.as_ref(),
+            anchor: moment.anchor.as_ref(),
+            fusion: moment.fusion.as_ref(),
+        };
+        self.draw(&followed, moment.foot(), epoch)
     }
 
     /// Draws somebody by steps, with the foot where it is since the last one.
-    pub fn draw(
-        &mut self,
-        steps: &Steps,
-        follower: Option<&Follower>,
-        anchor: Option<&Anchor>,
-        foot: [f64; 3],
-        epoch: usize,
-    ) -> Overlay {
-        let count = steps.steps.len();
+    pub fn draw(&mut self, followed: &Followed<'_>, foot: [f64; 3], epoch: usize) -> Overlay {
+        let count = followed.steps.steps.len();
         let overlay = match &self.stepped {
             Some((at, known, overlay)) if *at == count && *known == epoch => overlay.clone(),
             _ => {
-                let mut overlay = self.after_step(follower);
-                overlay.tracks.extend(self.way_on_graph(steps, anchor));
+                let mut overlay = self.after_step(followed.follower);
+                overlay.tracks.extend(self.others.tracks(followed, epoch));
                 self.stepped = Some((count, epoch, overlay.clone()));
                 overlay
             }
         };
-        self.with_foot(overlay, steps, anchor, foot, follower.is_some())
-    }
-
-    fn way_on_graph(&mut self, steps: &Steps, anchor: Option<&Anchor>) -> Option<Track> {
-        let (on_graph, measured) = self.on_graph.as_ref()?;
-        let Some(anchor) = anchor else {
-            self.decided = "waits until place and direction are known".into();
-            return None;
-        };
-        let way = on_graph.follow(steps, anchor, *measured);
-        self.decided = way.last.map_or_else(|| "waits for a step".into(), |last| last.to_string());
-        Some(track("on the graph", Role::Other, vec![way.places]))
+        self.with_foot(overlay, followed, foot)
     }
 
     fn after_step(&self, follower: Option<&Follower>) -> Overlay {
@@ -119,14 +108,9 @@ impl Drawing {
         }
     }
 
-    fn with_foot(
-        &self,
-        mut overlay: Overlay,
-        steps: &Steps,
-        anchor: Option<&Anchor>,
-        foot: [f64; 3],
-        followed: bool,
-    ) -> Overlay {
+    fn with_foot(&self, mut overlay: Overlay, followed: &Followed<'_>, foot: [f64; 3]) -> Overlay {
+        let Followed { steps, anchor, .. } = *followed;
+        let followed = followed.follower.is_some();
         // In a building, the steps alone are nowhere until it is known where they began.
         if followed && anchor.is_none() {
             return overlay;

@@ -1,12 +1,14 @@
 //! A shoe that is listened to, for the window: the same as `sohle live` does, without a word on the terminal.
 
+use super::beside::Followed;
 use super::drawing::Drawing;
 use super::replay::{warnings, whereabouts};
 use super::signals::{History, Row, Signal};
 use super::snapshot::{Kind, Link, Pace, Snapshot, Warning};
 use super::walk::Anchor;
-use super::{Command, Source, Work};
-use crate::cli::live::{Listening, Places, Show};
+use super::{Command, Source, Work, opening};
+use crate::cli::fixes as positions;
+use crate::cli::live::{Listening, Places, Positions, Show};
 use crate::cli::located::{Following, Wanted};
 use crate::follow::{self, Follower};
 use crate::link::connection::Happening;
@@ -79,13 +81,14 @@ impl Live {
     /// Begins to listen at an address.
     ///
     /// # Errors
-    /// As [`Follower::new`].
+    /// As [`Follower::new`], and when the positions cannot be listened to.
     pub fn new(
         address: Address,
         building: Option<crate::building::Building>,
         settings: &follow::Settings,
-    ) -> Result<Self, follow::Error> {
-        let places = match building {
+        source: Option<&positions::Source>,
+    ) -> Result<Self, opening::Error> {
+        let mut places = match building {
             None => None,
             Some(building) => {
                 let following = Following::new(Follower::new(building, settings)?, &Wanted::default());
@@ -94,7 +97,9 @@ impl Live {
             }
         };
         let opened = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let show = Show::silent(places, i64::try_from(opened.as_micros()).unwrap_or_default());
+        let hear = |source| Positions::prepare(source, places.as_mut(), true);
+        let positions = source.map(hear).transpose().map_err(opening::Error::positions)?;
+        let show = Show::silent((places, positions), i64::try_from(opened.as_micros()).unwrap_or_default());
         let connection = Connection::open(address.clone());
         let listening = Listening::new(connection, show, Vec::new(), false);
         Ok(Self::of(address, listening, settings.start.clone(), None))
@@ -193,9 +198,9 @@ impl Source for Live {
             Command::Track => self.order(Order::Track),
             Command::Start(start) => self.begin(&start),
             Command::Record(path) => self.record(path),
-            Command::OnGraph(on) => {
-                let building = self.follower().filter(|_| on).map(|follower| follower.building().clone());
-                let followed = self.drawing.follow_on(building.as_deref(), true);
+            Command::Beside(which, on) => {
+                let building = self.follower().map(|follower| follower.building().clone());
+                let followed = self.drawing.beside(which, on, building.as_deref(), true);
                 self.fault = followed.err().map(|error| error.to_string());
             }
             Command::Export(path) => {
@@ -249,7 +254,9 @@ impl Source for Live {
         let listening = listening.as_ref().expect(WHOLE);
         let follower = listening.show().places.as_ref().map(Places::follower);
         let foot = heard.foot();
-        let overlay = drawing.draw(&heard.track, follower, heard.anchor.as_ref(), foot, self.epoch);
+        let fusion = listening.show().fusion();
+        let followed = Followed { steps: &heard.track, follower, anchor: heard.anchor.as_ref(), fusion };
+        let overlay = drawing.draw(&followed, foot, self.epoch);
         let signals = heard.history.share();
         let span = signals.span().unwrap_or_default();
         let session = listening.connection().session();
@@ -278,7 +285,8 @@ impl Source for Live {
             scene: self.scene.clone(),
             overlay,
             signals,
-            on_graph: drawing.decided(),
+            others: drawing.others(),
+            positions: fusion.is_some(),
             warnings,
             settings: None,
             particle: None,

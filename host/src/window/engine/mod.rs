@@ -3,6 +3,7 @@
 //! The window gives [`Command`]s and gets [`Snapshot`]s, of which only the latest counts: a window that is slow drops
 //! pictures, never data, since every snapshot has all signals so far.
 
+pub mod beside;
 pub mod drawing;
 mod export;
 mod kept;
@@ -15,7 +16,8 @@ pub mod signals;
 pub mod snapshot;
 pub mod walk;
 
-pub use opening::{Opening, Plan, What};
+pub use beside::Beside;
+pub use opening::{Opening, Plan, Positions, What};
 pub use signals::{Signal, Signals};
 pub use snapshot::{Kind, Pace, Snapshot};
 
@@ -52,8 +54,8 @@ pub enum Command {
     Tracker(Box<tracker::Parameters>),
     /// Settings of the particle filter.
     Particle(Box<particle::Parameters>),
-    /// Follow on the walk graph of the building too, as the graph document does it, or end that.
-    OnGraph(bool),
+    /// Follow by another method too, or end that.
+    Beside(Beside, bool),
     /// Record what is heard into this file, or end that.
     Record(Option<PathBuf>),
     /// Write the path into this file.

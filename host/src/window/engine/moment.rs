@@ -3,6 +3,7 @@
 use super::signals::{Row, Signal};
 use super::walk::Settings;
 use crate::building::Building;
+use crate::fixes::Fusion;
 use crate::follow::{self, Follower, Orders, Said};
 use crate::particle::{Estimate, State};
 use crate::track::Track;
@@ -59,6 +60,8 @@ pub struct Moment {
     pub track: Track,
     /// Who follows in the building, if there is one.
     pub follower: Option<Follower>,
+    /// Positions of other sources, put together with the steps, if there are some.
+    pub fusion: Option<Fusion>,
     /// What was said after the last step.
     pub said: Option<Said>,
     /// How the track lies in the building, once that is known.
@@ -75,12 +78,17 @@ pub struct Moment {
 }
 
 impl Moment {
-    pub(super) fn first(building: Option<&Building>, settings: &Settings) -> Result<Self, follow::Error> {
+    pub(super) fn first(
+        building: Option<&Building>,
+        fusion: Option<&Fusion>,
+        settings: &Settings,
+    ) -> Result<Self, follow::Error> {
         Ok(Self {
             index: 0,
             tracker: Tracker::new(&settings.tracker),
             track: Track::default(),
             follower: building.map(|building| Follower::new(building.clone(), &settings.follow)).transpose()?,
+            fusion: fusion.cloned(),
             said: None,
             anchor: None,
             stance: false,
@@ -110,6 +118,14 @@ impl Moment {
     pub(super) fn follow(&mut self, recorded: &[(usize, Order)]) -> Option<Order> {
         self.stepped.push(self.index + 1);
         let step = self.track.steps.last()?;
+        if let Some(fusion) = &mut self.fusion {
+            while let Some(heard) = fusion.hear(step.stance_end + 1) {
+                if let Some(follower) = self.follower.as_mut().filter(|_| heard.counts()) {
+                    follower.observe(&heard.observation);
+                }
+            }
+            fusion.step(step);
+        }
         let said = self.follower.as_mut()?.step(step);
         let order = self.orders.after(recorded, said.mode);
         self.anchor = self.anchor.or_else(|| Anchor::found(&self.track, &said.estimate));

@@ -1,11 +1,13 @@
 //! What is to be shown: read by the engine, since a large file takes its time.
 
-use super::Source;
 use super::live::Live;
 use super::replay::Replay;
 use super::walk::{Settings, Walk};
 use crate::building::Building;
 use crate::building::open::{Options, open};
+use crate::cli::fixes::{Incoming, Source};
+use crate::fixes::line::Clock;
+use crate::fixes::{Fix, smoother};
 use crate::link::Address;
 use crate::recording::{self, Profile, Recording};
 use crate::{building, follow, particle, phone};
@@ -29,9 +31,19 @@ pub enum Error {
     /// Nobody can be followed.
     #[error(transparent)]
     Follow(#[from] follow::Error),
+    /// Positions of other sources cannot be read.
+    #[error("{0}")]
+    Positions(String),
     /// There is nothing in it.
     #[error("{0} has neither samples nor steps")]
     Empty(String),
+}
+
+impl Error {
+    /// Positions of other sources cannot be read.
+    pub fn positions(why: impl fmt::Display) -> Self {
+        Self::Positions(why.to_string())
+    }
 }
 
 /// What is to be opened.
@@ -79,6 +91,15 @@ impl Plan {
     }
 }
 
+/// Positions of other sources.
+#[derive(Clone, Debug)]
+pub enum Positions {
+    /// They are read first, or as they come.
+    From(Source),
+    /// They were read.
+    Read(Arc<[Fix]>),
+}
+
 /// What is to be opened, and how.
 #[derive(Clone, Debug)]
 pub struct Opening {
@@ -92,12 +113,21 @@ pub struct Opening {
     pub settings: Settings,
     /// How a phone's steps are found.
     pub phone: phone::Parameters,
+    /// Positions of other sources, in place of those that a recording brings along.
+    pub positions: Option<Positions>,
 }
 
 impl Opening {
     /// A recording or a shoe, by the steps alone.
     pub fn of(what: What) -> Self {
-        Self { what, profile: None, building: None, settings: Settings::default(), phone: phone::Parameters::default() }
+        Self {
+            what,
+            profile: None,
+            building: None,
+            settings: Settings::default(),
+            phone: phone::Parameters::default(),
+            positions: None,
+        }
     }
 
     /// What it is called.
@@ -112,20 +142,28 @@ impl Opening {
     ///
     /// # Errors
     /// When recording or building cannot be read, have nothing in them, or do not go together.
-    pub fn open(&self) -> Result<Box<dyn Source>, Error> {
+    pub fn open(&self) -> Result<Box<dyn super::Source>, Error> {
         let building = self.building.as_ref().map(Plan::building).transpose()?;
         match &self.what {
-            What::Shoe(address) => Ok(Box::new(Live::new(address.clone(), building, &self.settings.follow)?)),
+            What::Shoe(address) => {
+                let source = match &self.positions {
+                    Some(Positions::From(source)) => Some(source),
+                    // Nobody has read what a shoe will be told of.
+                    Some(Positions::Read(_)) | None => None,
+                };
+                Ok(Box::new(Live::new(address.clone(), building, &self.settings.follow, source)?))
+            }
             What::Recording(path) => self.replay(path, building),
         }
     }
 
-    fn replay(&self, path: &Path, building: Option<Building>) -> Result<Box<dyn Source>, Error> {
+    fn replay(&self, path: &Path, building: Option<Building>) -> Result<Box<dyn super::Source>, Error> {
         let mut settings = self.settings.clone();
-        let recording = if phone::open::is_phone(path) {
+        let mut recording = if phone::open::is_phone(path) {
             if settings.follow.particle == particle::Parameters::default() {
                 settings.follow.particle = particle::Parameters::phone();
             }
+            settings.positions = smoother::Parameters::phone();
             let samples = phone::open::open(path)?.samples;
             let steps = phone::steps(&samples, &self.phone);
             Recording { name: self.name(), steps, ..Recording::default() }
@@ -135,6 +173,25 @@ impl Opening {
         if recording.samples.is_empty() && recording.steps.is_empty() {
             return Err(Error::Empty(self.name()));
         }
+        match &self.positions {
+            Some(Positions::Read(fixes)) => recording.fixes = fixes.to_vec(),
+            Some(Positions::From(source)) => recording.fixes = read(source, &recording, building.as_ref(), &settings)?,
+            None => {}
+        }
         Ok(Box::new(Replay::new(Walk::new(Arc::new(recording), building, settings)?)))
     }
+}
+
+/// Positions for a recording; what is wrong with lines is told on the terminal.
+fn read(
+    source: &Source,
+    recording: &Recording,
+    building: Option<&Building>,
+    settings: &Settings,
+) -> Result<Vec<Fix>, Error> {
+    // The clock of a phone counts from 1970.
+    let phone = recording.samples.is_empty().then_some(0);
+    let mut incoming = Incoming::new(building, &settings.positions, false).map_err(Error::positions)?;
+    incoming.read(source, Clock::of_past(recording.began_us().or(phone))).map_err(Error::positions)?;
+    Ok(incoming.fixes().to_vec())
 }

@@ -1,5 +1,6 @@
 //! A recorded walk that is played: at any speed, forwards and backwards, step by step.
 
+use super::beside::Beside;
 use super::drawing::Drawing;
 use super::snapshot::{Kind, Pace, Snapshot, Warning, Whereabouts};
 use super::walk::{Act, Moment, Settings, Walk};
@@ -71,10 +72,10 @@ impl Replay {
         self.jump(index);
     }
 
-    fn follow_on(&mut self, on: bool) {
+    fn beside(&mut self, which: Beside, on: bool) {
         // Those of a phone are guessed: it has no samples of a foot.
         let measured = !self.walk.recording().samples.is_empty();
-        let followed = self.drawing.follow_on(self.walk.building().filter(|_| on), measured);
+        let followed = self.drawing.beside(which, on, self.walk.building(), measured);
         self.fault = followed.err().map(|error| error.to_string());
     }
 
@@ -132,7 +133,7 @@ impl Source for Replay {
                 settings.follow.particle = *particle;
                 self.set(settings);
             }
-            Command::OnGraph(on) => self.follow_on(on),
+            Command::Beside(which, on) => self.beside(which, on),
             Command::Record(_) => self.fault = Some("a recording is recorded already".into()),
             Command::Export(path) => {
                 let now = self.walk.now();
@@ -210,7 +211,8 @@ impl Source for Replay {
             scene: self.scene.clone(),
             overlay: self.drawing.moment(now, self.epoch),
             signals: self.walk.signals(),
-            on_graph: self.drawing.decided(),
+            others: self.drawing.others(),
+            positions: now.fusion.is_some(),
             warnings: warnings(now.tracker.counters(), now.follower.as_ref()),
             settings: Some(Arc::new(settings.tracker)),
             particle: now.follower.as_ref().map(|_| Arc::new(settings.follow.particle.clone())),

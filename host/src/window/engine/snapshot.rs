@@ -1,5 +1,6 @@
 //! All that the window shows of a moment. Made by the engine, never changed, cheap to hand on.
 
+use super::beside::Beside;
 use super::signals::Signals;
 use crate::particle::{self, Cluster, State};
 use crate::window::map::{Overlay, Scene};
@@ -124,8 +125,10 @@ pub struct Snapshot {
     pub overlay: Overlay,
     /// All signals so far.
     pub signals: Signals,
-    /// What the tracker on the walk graph decided at the last step, while it runs.
-    pub on_graph: Option<String>,
+    /// Other methods that follow too, and what each decided at the last step.
+    pub others: Vec<(Beside, String)>,
+    /// Whether positions of other sources come too.
+    pub positions: bool,
     /// What is not as it should be.
     pub warnings: Vec<Warning>,
     /// Settings of the tracker.

@@ -8,6 +8,7 @@ use super::kept::Kept;
 pub use super::moment::{Anchor, Moment};
 use super::signals::{History, Signals};
 use crate::building::Building;
+use crate::fixes::{Fusion, smoother};
 use crate::follow;
 use crate::recording::Recording;
 use crate::track::Track;
@@ -25,6 +26,8 @@ pub struct Settings {
     pub follow: follow::Settings,
     /// The samples are corrected by it before they are tracked.
     pub calibration: Option<Calibration>,
+    /// How steps and positions of other sources are put together.
+    pub positions: smoother::Parameters,
 }
 
 /// What somebody does while a walk goes on.
@@ -41,10 +44,29 @@ pub enum Act {
 /// Two values of signals are at least so far apart. **Units:** microseconds.
 const SIGNAL_PERIOD_US: i64 = 5_000;
 
+/// The positions that a recording brings along, in the frame of the building. Those that are of no use there are left out.
+fn positions(
+    recording: &Recording,
+    building: Option<&Building>,
+    settings: &Settings,
+) -> Result<Option<Fusion>, follow::Error> {
+    if recording.fixes.is_empty() {
+        return Ok(None);
+    }
+    let mut fusion = Fusion::new(building, &settings.positions)?;
+    for fix in &recording.fixes {
+        // It is counted there.
+        let _ = fusion.take(fix);
+    }
+    Ok(Some(fusion))
+}
+
 /// A recorded walk and where one is in it.
 pub struct Walk {
     recording: Arc<Recording>,
     building: Option<Building>,
+    /// Positions of other sources, of which none was heard yet.
+    fusion: Option<Fusion>,
     settings: Settings,
     /// What was done, each with the number of items before it; in order.
     acts: Vec<(usize, Act)>,
@@ -73,9 +95,10 @@ impl Walk {
             latest = latest.max(*time);
             *time = latest;
         }
-        let now = Moment::first(building.as_ref(), &settings)?;
+        let fusion = positions(&recording, building.as_ref(), &settings)?;
+        let now = Moment::first(building.as_ref(), fusion.as_ref(), &settings)?;
         let history = History::default();
-        Ok(Self { recording, building, settings, acts: Vec::new(), times, now, kept: Kept::default(), history })
+        Ok(Self { recording, building, fusion, settings, acts: Vec::new(), times, now, kept: Kept::default(), history })
     }
 
     /// What is gone through.
@@ -181,7 +204,7 @@ impl Walk {
     /// # Errors
     /// As [`follow::Follower::new`]. Nothing changes then.
     pub fn set(&mut self, settings: Settings) -> Result<(), follow::Error> {
-        let first = Moment::first(self.building.as_ref(), &settings)?;
+        let first = Moment::first(self.building.as_ref(), self.fusion.as_ref(), &settings)?;
         self.settings = settings;
         self.kept = Kept::default();
         self.history = History::default();
@@ -192,7 +215,7 @@ impl Walk {
 
     fn begin(&mut self) {
         // It was possible before, and nothing has changed.
-        if let Ok(first) = Moment::first(self.building.as_ref(), &self.settings) {
+        if let Ok(first) = Moment::first(self.building.as_ref(), self.fusion.as_ref(), &self.settings) {
             self.now = first;
             self.act_now();
         }
@@ -210,6 +233,8 @@ impl Walk {
                 now.follower = anew(&self.settings.follow.start)?;
                 now.tracker.reset();
                 now.track = Track::default();
+                // Those that were heard are behind; steps count from here on.
+                now.fusion = now.fusion.as_ref().map(Fusion::anew);
                 now.stepped.clear();
                 now.orders.forget_mode();
             }
