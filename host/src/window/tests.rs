@@ -164,7 +164,7 @@ fn the_walk_graph_is_followed_on_when_that_is_asked_for() {
     choose(&mut window, Beside::Positions, |app| !app.snapshot().positions);
     let ways = |app: &App, which: Beside| {
         let tracks = &app.snapshot().overlay.tracks;
-        tracks.iter().find(|track| track.name == which.word()).map_or(0, |track| track.pieces[0].len())
+        tracks.iter().find(|track| track.name == which.word().to_lowercase()).map_or(0, |track| track.pieces[0].len())
     };
     let runs = |app: &App, which: Beside| app.snapshot().others.iter().any(|(running, _)| *running == which);
     for which in [Beside::Documented, Beside::Matcher] {
@@ -214,7 +214,7 @@ fn positions_are_drawn_with_the_path_that_steps_and_they_give() {
         tracks.iter().find(|track| track.name == name).map(|track| track.pieces.len())
     };
     // Each position is a cross of two strokes.
-    until(&mut window, |app| pieces(app, "positions") == Some(36) && pieces(app, Beside::Positions.word()) == Some(1));
+    until(&mut window, |app| pieces(app, "positions") == Some(36) && pieces(app, "steps and positions") == Some(1));
     assert!(window.query_all_by_label_contains(" by 18 positions").next().is_some());
     choose(&mut window, Beside::Positions, |app| pieces(app, "positions").is_none());
 }

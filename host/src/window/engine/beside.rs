@@ -139,7 +139,7 @@ impl Others {
             };
             *said = told;
             if !way.is_empty() {
-                tracks.push(track(which.word(), *which, vec![way]));
+                tracks.push(track(&which.word().to_lowercase(), *which, vec![way]));
             }
         }
         tracks
