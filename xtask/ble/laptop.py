@@ -92,9 +92,16 @@ class Laptop:
             self.device.remove_listener("advertisement", seen)
             await self.device.stop_scanning()
 
-    async def connect(self, pair=False, bonded=True):
-        """Connects once, as far as encryption, services and characteristics. `bonded` is to encrypt with the key of the bond."""
-        address, name = await self.find()
+    async def bonded(self, address):
+        """Whether there is a bond with the device of this address."""
+        return await self.device.keystore.get(str(address)) is not None
+
+    async def connect(self, to=None, pair=False, bonded=True):
+        """Connects once, as far as services and characteristics, to a device by address and name or to what is found.
+
+        `bonded` is to encrypt with the key of the bond, `pair` to make one if there is none.
+        """
+        address, name = to or await self.find()
         connection = await self.device.connect(
             address, connection_parameters_preferences=LINUX, own_address_type=hci.OwnAddressType.PUBLIC, timeout=PATIENCE_S
         )
@@ -109,11 +116,11 @@ class Laptop:
 
     async def prepare(self, connection, pair, bonded):
         await connection.set_data_length(LONG_OCTETS, LONG_US)
-        keys = await self.device.keystore.get(str(connection.peer_address))
-        if pair and not keys:
+        known = await self.bonded(connection.peer_address)
+        if pair and not known:
             await connection.pair()
         elif bonded:
-            if not keys:
+            if not known:
                 raise Refused("there is no bond")
             await connection.encrypt()
         self.peer = Peer(connection)

@@ -32,6 +32,7 @@ from bumble.core import InvalidPacketError
 from bumble.hci import Address
 from bumble.transport.common import PacketParser
 
+import bluez
 from air import Air, Radio
 from laptop import COMMANDS, FAULTS, PATIENCE_S, STATUS, STEPS, UART_RX, UART_TX, Laptop, Refused, told
 
@@ -96,6 +97,8 @@ class Program:
             await laptop.power_on()
             if port:
                 await laptop.bridge(port, subscribe=laptop is self.laptop)
+        if self.arguments.bus:
+            self.bus = await bluez.serve(self.arguments.bus, self.laptop)
         self.tell(event="ready")
         orders = asyncio.StreamReader()
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(orders), sys.stdin)
@@ -230,6 +233,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--hci", type=int, required=True, metavar="PORT", help="where the shoe's HCI line connects to")
     parser.add_argument("--bridge", type=int, metavar="PORT", help="the laptop's connection, for sohle live tcp:...")
+    parser.add_argument("--bus", metavar="ADDRESS", help="a D-Bus on which the laptop's Bluetooth is BlueZ, for sohle live ble:...")
     parser.add_argument("--stranger", type=int, metavar="PORT", help="to the shoe's commands without a bond")
     parser.add_argument("--keys", metavar="FILE.json", help="where the laptop keeps its bonds [default: in memory]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of what is arbitrary")

@@ -1,14 +1,16 @@
 //! A live shoe without hardware: the firmware's loops on an emulated Cortex-M4F, its serial line a TCP port.
 
+pub mod machine;
 mod proxy;
+pub mod radio;
 
 use crate::firmware::{self, Budgets};
 use crate::process::{self, Failure};
 use crate::{device, in_root, tools};
+use machine::{INSTRUCTIONS_PER_S, Running, free_port, machine};
 use proxy::Proxy;
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
 /// Which walk the shoe takes, and where it is heard.
@@ -33,11 +35,11 @@ pub struct Arguments {
     /// TCP port on this machine that is the shoe's serial line
     #[arg(long, default_value_t = 7_700)]
     port: u16,
+    /// The shoe has Bluetooth, and a virtual radio with a laptop on it runs beside it; with --check, everything that can be
+    /// checked of it is
+    #[arg(long)]
+    ble: bool,
 }
-
-/// Virtual nanoseconds of an instruction, as a power of two: 62.5 million instructions in a second, about what a Cortex-M4F
-/// at 64 MHz executes.
-const SHIFT: &str = "shift=4,sleep=on,align=on";
 
 /// Recordings that are walked by the check, as far as they are here: name in the folder of recordings, layout, seconds.
 const RECORDINGS: [(&str, Option<&str>, u32); 2] =
@@ -50,17 +52,16 @@ const SHORT_S: u32 = 24;
 const SLEEP_AFTER_S: u32 = 3;
 /// After that walk: to fall asleep, and to tell twice of it. **Units:** s.
 const ASLEEP_S: u32 = SLEEP_AFTER_S + 15;
-/// Instructions of the emulated processor in a second, by [`SHIFT`].
-const INSTRUCTIONS_PER_S: f64 = 62.5e6;
 /// A walk takes as long as it takes; this is for one that hangs.
 const LIMIT: Duration = Duration::from_secs(180);
 
 /// Runs the shoe until it is stopped.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.check {
-        return check();
+    match (arguments.check, arguments.ble) {
+        (true, false) => return check(),
+        (true, true) => return radio::check(),
+        _ => tools::QEMU.required()?,
     }
-    tools::QEMU.required()?;
     let sohle = process::build("dev", "--bin", "sohle")?;
     let folder = in_root("target/emulate");
     std::fs::create_dir_all(&folder).map_err(|source| file(&folder, source))?;
@@ -69,16 +70,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => simulated(&sohle, &folder, &arguments.simulate, arguments.seed)?,
     };
     let counts = converted(&sohle, &folder, &walk, arguments.profile.as_deref())?;
-    build()?;
+    if arguments.ble {
+        return radio::run(&folder, &counts, arguments.port);
+    }
+    machine::build(&[])?;
     println!("the shoe waits for a laptop and walks as soon as it is there: in another terminal, run");
     println!("  cargo run --release -- live tcp:127.0.0.1:{}", arguments.port);
     println!("Ctrl-C ends it");
     process::run(&mut machine(arguments.port, &counts))
-}
-
-/// Builds the firmware for the emulator.
-pub fn build() -> Result<(), Failure> {
-    process::run(device::Route::find()?.build(&in_root("firmware/emulator")).args(["--bin", "sohle-shoe"]))
 }
 
 /// A simulated walk as a recording.
@@ -102,42 +101,8 @@ pub fn converted(sohle: &Path, folder: &Path, recording: &Path, profile: Option<
     Ok(counts)
 }
 
-/// The emulator with the shoe in it. It waits for the first connection to its port.
-pub fn machine(port: u16, counts: &Path) -> Command {
-    let words = "-machine mps2-an386 -display none -monitor none";
-    let mut command = process::program("qemu-system-arm", words.split_whitespace());
-    command.args(["-icount", SHIFT, "-serial"]).arg(format!("tcp:127.0.0.1:{port},server=on,wait=on"));
-    // The command line of the emulated program is cut at spaces, the path is not.
-    command.arg("-semihosting-config");
-    command
-        .arg(format!("enable=on,target=native,arg=sohle-shoe,arg={}", counts.display().to_string().replace(',', ",,")));
-    command.arg("-kernel").arg(device::binary("sohle-shoe"));
-    command
-}
-
 fn file(path: &Path, source: std::io::Error) -> Failure {
     Failure::File { path: path.display().to_string(), source }
-}
-
-/// The emulator while it runs.
-pub struct Running(Child);
-
-impl Running {
-    /// Starts it with the counts that its sensor gives.
-    pub fn start(port: u16, counts: &Path) -> Result<Self, Failure> {
-        let mut command = machine(port, counts);
-        // It tells that it waits, and when this machine is too slow for real time.
-        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        child.map(Self).map_err(|source| Failure::NotStarted { program: "qemu-system-arm".into(), source })
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // Killing fails only for a child that has just ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 /// The part of the summary of `sohle live` that matters here.
@@ -153,6 +118,8 @@ struct Summary {
     stack: Option<u32>,
     waiting: Option<u32>,
     load_max: u32,
+    raw: u64,
+    raw_lost: u64,
     asleep: Option<bool>,
     sleeps: Option<u32>,
 }
@@ -161,7 +128,7 @@ struct Summary {
 pub fn check() -> Result<(), Failure> {
     tools::QEMU.required()?;
     let sohle = process::build("dev", "--bin", "sohle")?;
-    build()?;
+    machine::build(&[])?;
     let folder = in_root("target/emulate");
     std::fs::create_dir_all(&folder).map_err(|source| file(&folder, source))?;
     let statics = firmware::statics_without(&device::binary("sohle-shoe"), &["TWIN", "WALK"])?;
@@ -306,10 +273,4 @@ fn live_walk(
     let said = process::read_within(&mut command, LIMIT)?;
     let last = said.out.lines().last().unwrap_or_default();
     serde_json::from_str(last).map_err(|error| Failure::Found(format!("sohle live said '{last}': {error}")))
-}
-
-/// A port that nobody listens on now.
-pub fn free_port() -> Result<u16, Failure> {
-    let listener = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
-    listener.map(|address| address.port()).map_err(|error| Failure::Found(format!("no free port: {error}")))
 }

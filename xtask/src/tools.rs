@@ -54,8 +54,14 @@ pub const LAVAPIPE: Tool = Tool {
 /// A display that nobody sees.
 pub const XVFB: Tool = Tool { what: "a display in memory", present_by: &["Xvfb"], packages: &["xvfb"] };
 
+/// What the virtual radio is written in.
+pub const PYTHON: Tool = Tool { what: "Python 3", present_by: &["python3"], packages: &["python3", "python3-venv"] };
+
+/// The bus on which a program and its Bluetooth speak.
+pub const DBUS: Tool = Tool { what: "the D-Bus daemon", present_by: &["dbus-daemon"], packages: &["dbus-daemon"] };
+
 /// Everything.
-pub const ALL: [Tool; 9] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD, LAVAPIPE, XVFB];
+pub const ALL: [Tool; 11] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD, LAVAPIPE, XVFB, PYTHON, DBUS];
 
 impl Tool {
     /// Whether the machine has it.

@@ -29,7 +29,7 @@ pub fn check() -> Result<(), Failure> {
         tool.required()?;
     }
     let sohle = process::build("dev", "--bin", "sohle")?;
-    emulate::build()?;
+    emulate::machine::build(&[])?;
     let folder = in_root(FOLDER);
     std::fs::create_dir_all(folder.join("sohle")).map_err(|source| file(&folder, source))?;
     // Colours are looked for as they are on light ground.
@@ -61,8 +61,8 @@ pub fn check() -> Result<(), Failure> {
     command.current_dir(crate::root()).args(["simulate", "--building", BUILDING, "--route", ROUTE, "--out"]);
     process::read(command.arg(&simulated))?;
     let counts = emulate::converted(&sohle, &folder, &simulated, None)?;
-    let port = emulate::free_port()?;
-    let shoe = emulate::Running::start(port, &counts)?;
+    let port = emulate::machine::free_port()?;
+    let shoe = emulate::machine::Running::start(port, &counts)?;
     let address = format!("tcp:127.0.0.1:{port}");
     let running = Running::start(on_screen(&["live", &address, "--no-record", "--building", BUILDING]))?;
     let running = seen("live, the emulated shoe", &screen, running)?;

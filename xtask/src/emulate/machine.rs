@@ -1,0 +1,73 @@
+//! The emulated microcontroller: its firmware, and the emulator while it runs.
+
+use crate::process::{self, Failure};
+use crate::{device, in_root};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+/// Virtual nanoseconds of an instruction, as a power of two: 62.5 million instructions in a second, about what a Cortex-M4F
+/// at 64 MHz executes.
+pub const SHIFT: &str = "shift=4,sleep=on,align=on";
+
+/// Instructions of the emulated processor in a second, by [`SHIFT`].
+pub const INSTRUCTIONS_PER_S: f64 = 62.5e6;
+
+/// Builds the firmware for the emulator, with these features.
+pub fn build(features: &[&str]) -> Result<(), Failure> {
+    let mut command = device::Route::find()?.build(&in_root("firmware/emulator"));
+    process::run(command.args(["--bin", "sohle-shoe", "--features", &features.join(",")]))
+}
+
+/// The emulator with the shoe in it. It waits for the first connection to its port.
+pub fn machine(port: u16, counts: &Path) -> Command {
+    emulator(SHIFT, &[format!("tcp:127.0.0.1:{port},server=on,wait=on")], &[counts], &device::binary("sohle-shoe"))
+}
+
+/// The emulator at this pace, with these serial lines, running `program` with the names of these files.
+pub fn emulator(pace: &str, serials: &[String], files: &[&Path], program: &Path) -> Command {
+    let words = "-machine mps2-an386 -display none -monitor none";
+    let mut command = process::program("qemu-system-arm", words.split_whitespace());
+    command.args(["-icount", pace]);
+    for serial in serials {
+        command.args(["-serial", serial]);
+    }
+    // The command line of the emulated program is cut at spaces, the paths are not.
+    let mut semihosting = String::from("enable=on,target=native,arg=sohle-shoe");
+    for path in files {
+        semihosting += &format!(",arg={}", path.display().to_string().replace(',', ",,"));
+    }
+    command.args(["-semihosting-config", &semihosting]).arg("-kernel").arg(program);
+    command
+}
+
+/// The emulator while it runs.
+pub struct Running(Child);
+
+impl Running {
+    /// Starts it with the counts that its sensor gives.
+    pub fn start(port: u16, counts: &Path) -> Result<Self, Failure> {
+        Self::of(machine(port, counts))
+    }
+
+    /// Starts this one.
+    pub fn of(mut command: Command) -> Result<Self, Failure> {
+        // It tells that it waits, and when this machine is too slow for real time.
+        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        child.map(Self).map_err(|source| Failure::NotStarted { program: "qemu-system-arm".into(), source })
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Killing fails only for a child that has just ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A port that nobody listens on now.
+pub fn free_port() -> Result<u16, Failure> {
+    let listener = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
+    listener.map(|address| address.port()).map_err(|error| Failure::Found(format!("no free port: {error}")))
+}
