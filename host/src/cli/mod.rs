@@ -19,6 +19,7 @@ pub mod graph;
 pub mod line;
 pub mod live;
 pub mod located;
+pub mod pair;
 pub mod parameters;
 mod phone;
 pub mod ports;
@@ -69,6 +70,7 @@ enum Command {
     Line(line::Args),
     Live(live::Args),
     Ports(ports::Args),
+    Pair(pair::Args),
     Window(Box<window::Args>),
     #[command(name = "command")]
     Ask(command::Args),
@@ -116,6 +118,7 @@ fn dispatch(command: Command) -> Result<(), Error> {
         Command::Line(args) => line::run(args),
         Command::Live(args) => live::run(args),
         Command::Ports(args) => ports::run(args),
+        Command::Pair(args) => pair::run(args),
         Command::Window(args) => window::run(*args),
         Command::Ask(args) => command::run(args),
         Command::Parameters(args) => parameters::run(args),
