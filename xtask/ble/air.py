@@ -316,6 +316,12 @@ class Radio(Controller):
             )
         )
 
+    def on_hci_command(self, command):
+        """A command that this controller has not."""
+        if isinstance(command, hci.HCI_SyncCommand):
+            return super().on_hci_command(command)
+        self._send_hci_command_status(hci.HCI_ErrorCode.UNKNOWN_HCI_COMMAND_ERROR, command.op_code)
+
     def on_hci_command_packet(self, command):
         # The only command without an answer.
         if command.op_code != hci.HCI_HOST_NUMBER_OF_COMPLETED_PACKETS_COMMAND:

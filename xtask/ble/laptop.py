@@ -135,6 +135,8 @@ class Laptop:
         return found[0]
 
     def facts(self):
+        if not self.connection:
+            raise Refused("the connection was lost")
         link = self.radio.link.find(self.radio.find_le_connection_by_handle(self.connection.handle))[0]
         mtu = self.peer.gatt_client.mtu if self.peer else 23
         facts = {"mtu": mtu, "encrypted": bool(self.connection.encryption)}

@@ -184,8 +184,9 @@ impl Connection {
             true => WriteType::WithoutResponse,
             false => WriteType::WithResponse,
         };
-        let written = timeout(GOODBYE, self.peripheral.write(&self.commands, piece, kind));
-        match self.runtime.block_on(written) {
+        // A time limit begins inside the runtime that keeps it.
+        let _inside = self.runtime.enter();
+        match self.runtime.block_on(timeout(GOODBYE, self.peripheral.write(&self.commands, piece, kind))) {
             Ok(written) => written.map_err(io::Error::other),
             Err(_) => Err(io::ErrorKind::TimedOut.into()),
         }
@@ -196,6 +197,7 @@ impl Drop for Connection {
     fn drop(&mut self) {
         self.listening.abort();
         // A shoe that is gone needs no goodbye.
+        let _inside = self.runtime.enter();
         let _ = self.runtime.block_on(timeout(GOODBYE, self.peripheral.disconnect()));
     }
 }

@@ -99,6 +99,14 @@ impl Scene {
         Ok((ended.code == Some(0), ended.said.out + &ended.said.err))
     }
 
+    /// Opens the pairing window over the cable, or closes it.
+    fn window(&self, cable: &str, seconds: &str) -> Result<(), Failure> {
+        match self.sohle(&["pair", cable, "--seconds", seconds])? {
+            (true, _) => Ok(()),
+            (false, said) => Err(wrong(format!("sohle pair on the cable said: {said}"))),
+        }
+    }
+
     fn live(&self, address: &str, seconds: u32, record: Option<&Path>) -> Result<Live, Failure> {
         Live::start(&self.sohle, address, seconds, record, &self.bus)
     }
@@ -126,13 +134,11 @@ impl Scene {
         }
         println!("closed window: no pairing, and nothing read, subscribed or written without");
         let cable = format!("tcp:127.0.0.1:{cable}");
-        let (content, said) = self.sohle(&["pair", &cable, "--seconds", "60"])?;
-        if !content {
-            return Err(wrong(format!("sohle pair on the cable said: {said}")));
-        }
+        self.window(&cable, "60")?;
         let facts = self.radio.order("pair")?;
         self.radio.order("leave")?;
         println!("window opened over the cable: paired ({})", facts_in_words(&facts));
+        self.window(&cable, "0")?;
         refused_everything(&self.radio.order("stranger")?)?;
         let (content, said) = self.sohle(&["pair", "ble:any"])?;
         if content || !said.contains("refused") {
