@@ -127,8 +127,8 @@ fn is_request(code: u8, length: u16) -> bool {
         0x08 => length == 7 || length == 21,
         // Read by group type: the types of groups are short.
         0x10 => length == 7,
-        // Read multiple, prepare write.
-        0x0e | 0x16 => length >= 5,
+        // Read multiple (by the specification, and as the host stack has it), prepare write.
+        0x0e | 0x20 | 0x16 => length >= 5,
         // Write request and command.
         0x12 | 0x52 => length >= 3,
         // Execute write.
