@@ -6,9 +6,11 @@ use sohle_shared::wire::message::Action;
 
 /// Opens a shoe's pairing window over its cable
 #[derive(Debug, clap::Args)]
-#[command(after_help = "A shoe pairs only while its window is open, and whoever has its cable may open it; its button does the same.\n\
+#[command(
+    after_help = "A shoe pairs only while its window is open, and whoever has its cable may open it; its button does the same.\n\
 While it is open, pair from the laptop that is to be known: 'bluetoothctl pair ADDRESS' on Linux, the settings elsewhere.\n\n\
-Examples:\n  sohle pair serial:/dev/ttyACM0\n  sohle pair serial:/dev/ttyACM0 --seconds 120")]
+Examples:\n  sohle pair serial:/dev/ttyACM0\n  sohle pair serial:/dev/ttyACM0 --seconds 120"
+)]
 pub struct Args {
     /// Where the shoe's cable is: a serial port, at 921600 baud unless it says otherwise, or a network port
     #[arg(value_name = "serial:PATH[@BAUD]|tcp:HOST:PORT")]

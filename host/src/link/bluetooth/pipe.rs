@@ -31,13 +31,15 @@ pub fn ends(line: Line) -> (Reader, Writer) {
 impl Read for Reader {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         while self.taken == self.piece.len() {
-            self.taken = 0;
-            self.piece = self.received.recv_timeout(LOOK).map_err(|error| match error {
+            let next = self.received.recv_timeout(LOOK).map_err(|error| match error {
                 RecvTimeoutError::Timeout => ErrorKind::TimedOut.into(),
                 RecvTimeoutError::Disconnected => {
                     io::Error::new(ErrorKind::ConnectionReset, "the shoe is out of range, or off")
                 }
-            })?;
+            });
+            // Only when there is one: what was read already must not be read again.
+            self.piece = next?;
+            self.taken = 0;
         }
         let count = (&self.piece[self.taken..]).read(out)?;
         self.taken += count;
@@ -91,6 +93,12 @@ mod tests {
         }
         assert_eq!(read, bytes);
         assert_eq!(reader.read(&mut buffer).unwrap_err().kind(), ErrorKind::TimedOut);
+        shoe.send(vec![7]).unwrap();
+        assert_eq!((reader.read(&mut buffer).unwrap(), buffer[0]), (1, 7));
+        // What was read is not read again after a silence.
+        for _ in 0..2 {
+            assert_eq!(reader.read(&mut buffer).unwrap_err().kind(), ErrorKind::TimedOut);
+        }
         drop(shoe);
         let gone = reader.read(&mut buffer).unwrap_err();
         assert_eq!(
