@@ -242,7 +242,9 @@ fn set_off(header: Header, shoe: &'static mut Wearer, machine: Machine) {
 /// Ends the emulator.
 fn give_up() -> ! {
     debug::exit(debug::EXIT_FAILURE);
-    loop {}
+    loop {
+        cortex_m::asm::nop();
+    }
 }
 
 #[inline(never)]
