@@ -316,6 +316,16 @@ class Radio(Controller):
             )
         )
 
+    def on_hci_le_create_connection_cancel_command(self, _command):
+        waiting, self.pending_le_connection = self.pending_le_connection, None
+        if waiting:
+            # Without this event the host waits for ever.
+            cancelled, peer = hci.HCI_ErrorCode.UNKNOWN_CONNECTION_IDENTIFIER_ERROR, waiting.peer_address
+            event = hci.HCI_LE_Connection_Complete_Event
+            central = hci.Role.CENTRAL
+            self.send_hci_packet(event(cancelled, 0, central, peer.address_type, peer, 0, 0, 0, 0))
+        return hci.HCI_StatusReturnParameters(hci.HCI_ErrorCode.SUCCESS)
+
     def on_hci_command(self, command):
         """A command that this controller has not."""
         if isinstance(command, hci.HCI_SyncCommand):

@@ -109,7 +109,10 @@ class Laptop:
         connection.on("disconnection", lambda reason: self.lost(connection, reason))
         try:
             await asyncio.wait_for(self.prepare(connection, pair, bonded), PATIENCE_S)
-        except BaseException:
+        except BaseException as error:
+            # Bumble cancels what it waits for when the connection ends; nobody has cancelled this.
+            if isinstance(error, asyncio.CancelledError) and not asyncio.current_task().cancelling():
+                raise Refused("the connection was lost") from error
             await self.disconnect()
             raise
         self.tell(event="connected", laptop=self.name, shoe=name, address=str(address), **self.facts())

@@ -196,13 +196,14 @@ class Program:
 
     async def order_garbage_peer(self, count):
         """Attribute, signalling and security packets with arbitrary content, on every channel and on none."""
-        if self.stranger.connection is None:
-            await self.stranger.connect(bonded=False)
-        for sent in range(int(count)):
+        connections = 0
+        for _ in range(int(count)):
+            # The shoe may end a connection like this one, at any time.
+            while self.stranger.connection is None:
+                connections += 1
+                with contextlib.suppress(*FAULTS):
+                    await self.stranger.connect(bonded=False)
             connection = self.stranger.connection
-            if connection is None:
-                # The shoe may end a connection like this one.
-                return {"sent": sent}
             body = self.random.randbytes(self.random.randrange(1, 64))
             channel = self.random.choice((*FIXED_CHANNELS, self.random.randrange(0x10000)))
             length = len(body) if self.random.random() < 0.8 else self.random.randrange(0x10000)
@@ -210,7 +211,7 @@ class Program:
             self.stranger.device.host.send_acl_sdu(connection.handle, pdu)
             await asyncio.sleep(0.02)
         await self.stranger.disconnect()
-        return {"sent": int(count)}
+        return {"connections": connections}
 
     async def order_figures(self):
         now = asyncio.get_running_loop().time()
