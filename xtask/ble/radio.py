@@ -14,7 +14,8 @@ happens between is told in lines with `"event"`:
     stranger-commands    the same connects and carries what comes on its port to the shoe's commands
     stranger-leave       and is gone
     garbage-controller N the shoe's controller sends N random packets and bytes
-    garbage-peer N       the stranger sends N random packets to the shoe
+    garbage-stranger N   the stranger sends N random packets to the shoe
+    garbage-laptop N     the laptop with the bond does, and random bytes as commands
     figures              what the radio carried since the last time
     quit
 """
@@ -194,24 +195,36 @@ class Program:
             line.transport.write(garbage)
             await asyncio.sleep(0.005)
 
-    async def order_garbage_peer(self, count):
-        """Attribute, signalling and security packets with arbitrary content, on every channel and on none."""
+    async def garbage(self, laptop, count, connect, more=()):
+        """Attribute, signalling and security packets with arbitrary content, on every channel and on none, or what `more` sends."""
         connections = 0
         for _ in range(int(count)):
             # The shoe may end a connection like this one, at any time.
-            while self.stranger.connection is None:
+            while laptop.connection is None or laptop.peer is None:
                 connections += 1
                 with contextlib.suppress(*FAULTS):
-                    await self.stranger.connect(bonded=False)
-            connection = self.stranger.connection
+                    await connect()
             body = self.random.randbytes(self.random.randrange(1, 64))
             channel = self.random.choice((*FIXED_CHANNELS, self.random.randrange(0x10000)))
             length = len(body) if self.random.random() < 0.8 else self.random.randrange(0x10000)
             pdu = length.to_bytes(2, "little") + channel.to_bytes(2, "little") + body
-            self.stranger.device.host.send_acl_sdu(connection.handle, pdu)
+            send = self.random.choice((lambda handle, _: laptop.device.host.send_acl_sdu(handle, pdu), *more))
+            send(laptop.connection.handle, body)
             await asyncio.sleep(0.02)
-        await self.stranger.disconnect()
+        await laptop.leave()
         return {"connections": connections}
+
+    async def order_garbage_stranger(self, count):
+        return await self.garbage(self.stranger, count, lambda: self.stranger.connect(bonded=False))
+
+    async def order_garbage_laptop(self, count):
+        def command(handle, body):
+            """A write without response, whose answer nobody waits for."""
+            place = self.laptop.characteristic(self.random.choice((COMMANDS, UART_RX))).handle
+            pdu = bytes([0x52]) + place.to_bytes(2, "little") + body
+            self.laptop.device.host.send_l2cap_pdu(handle, FIXED_CHANNELS[0], pdu)
+
+        return await self.garbage(self.laptop, count, self.laptop.connect, [command])
 
     async def order_figures(self):
         now = asyncio.get_running_loop().time()

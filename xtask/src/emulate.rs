@@ -1,17 +1,19 @@
 //! A live shoe without hardware: the firmware's loops on an emulated Cortex-M4F, its serial line a TCP port.
 
+mod live;
 pub mod machine;
+mod pace;
 mod proxy;
 pub mod radio;
 
 use crate::firmware::{self, Budgets};
 use crate::process::{self, Failure};
 use crate::{device, in_root, tools};
+use live::{Live, Walk};
 use machine::{INSTRUCTIONS_PER_S, Running, free_port, machine};
 use proxy::Proxy;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 /// Which walk the shoe takes, and where it is heard.
 #[derive(clap::Args)]
@@ -52,8 +54,6 @@ const SHORT_S: u32 = 24;
 const SLEEP_AFTER_S: u32 = 3;
 /// After that walk: to fall asleep, and to tell twice of it. **Units:** s.
 const ASLEEP_S: u32 = SLEEP_AFTER_S + 15;
-/// A walk takes as long as it takes; this is for one that hangs.
-const LIMIT: Duration = Duration::from_secs(180);
 
 /// Runs the shoe until it is stopped.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -152,8 +152,10 @@ pub fn check() -> Result<(), Failure> {
             _ => {}
         }
         let port = free_port()?;
-        let running = Running::start(port, &counts)?;
-        let summary = live_walk(&sohle, port, *seconds, Some(&live), None)?;
+        let mut running = Running::start(port, &counts)?;
+        let Walk { summary, .. } = live_walk(&sohle, &mut running, port, *seconds, |command| {
+            command.arg("--raw").arg("--out").arg(&live);
+        })?;
         drop(running);
         row(name, &summary);
         stack = stack.max(summary.stack.unwrap_or_default());
@@ -197,9 +199,10 @@ fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<u32, Failure> {
     let walk = |sleep_after_s, seconds| {
         let parameters = parameters(sleep_after_s)?;
         let port = free_port()?;
-        let running = Running::start(port, counts)?;
-        let summary = live_walk(sohle, port, seconds, None, Some(&parameters))?;
-        drop(running);
+        let mut running = Running::start(port, counts)?;
+        let Walk { summary, .. } = live_walk(sohle, &mut running, port, seconds, |command| {
+            command.arg("--no-record").arg("--parameters").arg(parameters);
+        })?;
         Ok::<_, Failure>(summary)
     };
     let awake = walk(0, SHORT_S)?;
@@ -221,11 +224,13 @@ fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<u32, Failure> {
 /// of the stack.
 fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<u32, Failure> {
     let (shoe, laptop) = (free_port()?, free_port()?);
-    let running = Running::start(shoe, counts)?;
+    let mut running = Running::start(shoe, counts)?;
     let proxy =
         Proxy::start(laptop, shoe).map_err(|source| Failure::NotStarted { program: "the bad line".into(), source })?;
-    // Time for what is sent again, and for an emulator that does not keep up.
-    let summary = live_walk(sohle, laptop, seconds + 15, None, None)?;
+    // Time for what is sent again.
+    let Walk { summary, .. } = live_walk(sohle, &mut running, laptop, seconds + 10, |command| {
+        command.arg("--no-record");
+    })?;
     let (damaged, lost) = proxy.faults();
     drop(running);
     row("the first over a bad line", &summary);
@@ -253,24 +258,15 @@ fn row(name: &str, summary: &Summary) {
     );
 }
 
-/// `sohle live` for so long; with the sensor's counts if they are to be recorded, and with these settings.
+/// `sohle live` with `more` of its arguments, until the shoe's clock is so far.
 fn live_walk(
     sohle: &Path,
+    running: &mut Running,
     port: u16,
     seconds: u32,
-    record: Option<&Path>,
-    parameters: Option<&Path>,
-) -> Result<Summary, Failure> {
-    let mut command = Command::new(sohle);
-    command.args(["live", &format!("tcp:127.0.0.1:{port}"), "--for", &seconds.to_string(), "--format", "json", "-q"]);
-    match record {
-        Some(path) => command.arg("--raw").arg("--out").arg(path),
-        None => command.arg("--no-record"),
-    };
-    if let Some(path) = parameters {
-        command.arg("--parameters").arg(path);
-    }
-    let said = process::read_within(&mut command, LIMIT)?;
-    let last = said.out.lines().last().unwrap_or_default();
-    serde_json::from_str(last).map_err(|error| Failure::Found(format!("sohle live said '{last}': {error}")))
+    more: impl FnOnce(&mut Command),
+) -> Result<Walk, Failure> {
+    let live = Live::start(sohle, &format!("tcp:127.0.0.1:{port}"), more)?;
+    running.pace.wait_until(seconds.into())?;
+    live.finish()
 }

@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -187,6 +187,22 @@ pub fn read_within(command: &mut Command, limit: Duration) -> Result<Said, Failu
         None => "a signal".into(),
     };
     Err(ended(command, &status))
+}
+
+/// Asks a program to end, as Ctrl-C does, and waits so long for it; none if it goes on.
+pub fn interrupt(child: &mut Child, patience: Duration) -> Result<Option<ExitStatus>, Failure> {
+    let waited = |child: &mut Child| child.try_wait().map_err(|error| Failure::Found(format!("a program: {error}")));
+    if let Some(status) = waited(child)? {
+        return Ok(Some(status));
+    }
+    read(&mut program("kill", ["-INT", &child.id().to_string()]))?;
+    let begun = Instant::now();
+    loop {
+        match waited(child)? {
+            None if begun.elapsed() < patience => thread::sleep(Duration::from_millis(50)),
+            ended => return Ok(ended),
+        }
+    }
 }
 
 fn all(mut pipe: impl Read) -> String {

@@ -111,16 +111,11 @@ impl Running {
 
     /// Asks it to end by Ctrl-C, and waits until it has ended well.
     fn interrupt(mut self) -> Result<(), Failure> {
-        process::read(&mut process::program("kill", ["-INT", &self.0.id().to_string()]))?;
-        let begun = Instant::now();
-        while begun.elapsed() < PATIENCE {
-            match self.0.try_wait() {
-                Ok(Some(status)) if status.success() => return Ok(()),
-                Ok(Some(status)) => return Err(Failure::Found(format!("the window ended with {status}"))),
-                _ => std::thread::sleep(LOOK),
-            }
+        match process::interrupt(&mut self.0, PATIENCE)? {
+            Some(status) if status.success() => Ok(()),
+            Some(status) => Err(Failure::Found(format!("the window ended with {status}"))),
+            None => Err(Failure::Found("the window does not close by Ctrl-C".into())),
         }
-        Err(Failure::Found("the window does not close by Ctrl-C".into()))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The emulated microcontroller: its firmware, and the emulator while it runs.
 
+use super::pace::Pace;
 use crate::process::{self, Failure};
 use crate::{device, in_root};
 use std::net::TcpListener;
@@ -21,7 +22,18 @@ pub fn build(features: &[&str]) -> Result<(), Failure> {
 
 /// The emulator with the shoe in it. It waits for the first connection to its port.
 pub fn machine(port: u16, counts: &Path) -> Command {
-    emulator(SHIFT, &[format!("tcp:127.0.0.1:{port},server=on,wait=on")], &[counts], &device::binary("sohle-shoe"))
+    emulator(SHIFT, &[cable(port, true)], &[counts], &device::binary("sohle-shoe"))
+}
+
+/// A serial line that whoever connects to this port is at the other end of. What is written goes at once: by default the
+/// emulator's system waits up to 40 ms for more.
+pub fn cable(port: u16, wait: bool) -> String {
+    format!("tcp:127.0.0.1:{port},server=on,wait={},nodelay=on", if wait { "on" } else { "off" })
+}
+
+/// A serial line to who listens on this port, in the same way.
+pub fn line_to(port: u16) -> String {
+    format!("tcp:127.0.0.1:{port},nodelay=on")
 }
 
 /// The emulator at this pace, with these serial lines, running `program` with the names of these files.
@@ -42,27 +54,35 @@ pub fn emulator(pace: &str, serials: &[String], files: &[&Path], program: &Path)
 }
 
 /// The emulator while it runs.
-pub struct Running(Child);
+pub struct Running {
+    child: Child,
+    /// The shoe's time.
+    pub pace: Pace,
+}
 
 impl Running {
     /// Starts it with the counts that its sensor gives.
     pub fn start(port: u16, counts: &Path) -> Result<Self, Failure> {
-        Self::of(machine(port, counts))
+        let program = device::binary("sohle-shoe");
+        Self::of(|pace| emulator(SHIFT, &[cable(port, true), "null".into(), pace], &[counts], &program))
     }
 
-    /// Starts this one.
-    pub fn of(mut command: Command) -> Result<Self, Failure> {
+    /// Starts the one that has this as its third serial line.
+    pub fn of(emulator: impl FnOnce(String) -> Command) -> Result<Self, Failure> {
+        let pace = Pace::listen()?;
+        let mut command = emulator(line_to(pace.port()?));
         // It tells that it waits, and when this machine is too slow for real time.
         let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        child.map(Self).map_err(|source| Failure::NotStarted { program: "qemu-system-arm".into(), source })
+        let child = child.map_err(|source| Failure::NotStarted { program: "qemu-system-arm".into(), source })?;
+        Ok(Self { child, pace })
     }
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
         // Killing fails only for a child that has just ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 

@@ -2,7 +2,7 @@
 //! names its peripherals.
 
 use cortex_m::interrupt::InterruptNumber;
-use cortex_m::peripheral::NVIC;
+use cortex_m::peripheral::{NVIC, SCB};
 
 /// Number of an interrupt.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -14,6 +14,8 @@ impl Irq {
     /// A byte has come from the Bluetooth controller.
     #[cfg(feature = "ble")]
     pub const HCI_RECEIVED: Self = Self(2);
+    /// A byte has come from whoever runs the emulator.
+    pub const PACE_RECEIVED: Self = Self(4);
     /// The timer of the alarms.
     pub const ALARM_TIMER: Self = Self(8);
     /// The free timer.
@@ -51,4 +53,16 @@ pub fn enable(irq: Irq, priority: u8) {
 pub fn prioritise(irq: Irq, priority: u8) {
     // SAFETY: called while the machine is set up, before anything else can own the controller.
     unsafe { cortex_m::Peripherals::steal().NVIC.set_priority(irq, priority) }
+}
+
+/// Makes the interrupt wait as if its device had raised it.
+pub fn raise(irq: Irq) {
+    NVIC::pend(irq);
+}
+
+/// Whether any waits: ISRPENDING of ICSR (ARMv7-M Architecture Reference Manual, B3.2.4).
+pub fn waits() -> bool {
+    // SAFETY: reading the register has no side effect.
+    let state = unsafe { (*SCB::PTR).icsr.read() };
+    state & 1 << 22 != 0
 }

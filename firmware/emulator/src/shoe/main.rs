@@ -2,7 +2,8 @@
 //!
 //! The sensor is its twin, which reads a recorded or simulated walk; driver, tracker and wire are those of the boards. The
 //! sensor is read at a higher priority than everything else runs at, as there. The serial line is whatever the emulator
-//! connects it to. Time is that of the emulated machine: with `-icount` it is real time for who watches.
+//! connects it to. Time is that of the emulated machine, with `-icount` real time for who watches, but for what [`clock`] leaves
+//! out or skips.
 //!
 //! With the feature `ble` there is a second serial line, to a Bluetooth controller, and a flash in a file. The walk begins
 //! when the first laptop says something, whichever way it comes; without the feature the shoe walks at once, since the
@@ -16,6 +17,7 @@ mod desk;
 mod flash;
 mod interrupt;
 mod memory;
+mod pace;
 #[cfg(feature = "ble")]
 mod radio;
 mod sensor;
@@ -104,7 +106,9 @@ impl Board for Machine {
         BoardHealth { load: busy as u16, battery: None, stack: self.stack.used(), reset: ResetReason::PowerOn }
     }
 
-    fn alive(&mut self) {}
+    fn alive(&mut self) {
+        pace::tell();
+    }
 }
 
 /// The twin, with the walk as its source.
@@ -209,6 +213,7 @@ unsafe fn DefaultHandler(number: i16) {
         #[cfg(feature = "ble")]
         // SAFETY: as below.
         Some(Irq::RADIO) => unsafe { RADIO.on_interrupt() },
+        Some(Irq::PACE_RECEIVED) => pace::on_received(),
         Some(Irq::ALARM_TIMER) => clock::on_alarm(),
         Some(Irq::FREE_TIMER) => clock::on_round(),
         // SAFETY: called from the interrupt of this executor alone, which its start has unmasked.
@@ -223,6 +228,7 @@ unsafe fn DefaultHandler(number: i16) {
 #[inline(never)]
 fn set_off(header: Header, shoe: &'static mut Wearer, machine: Machine) {
     clock::start();
+    pace::start();
     interrupt::prioritise(Irq::SENSE, SENSE_PRIORITY);
     interrupt::prioritise(Irq::PROCESS, PROCESS_PRIORITY);
     let sensing = start_sensing(header.accel_period_ns, header.gyro_period_ns).expect("started once");
@@ -281,9 +287,7 @@ fn main() -> ! {
     loop {
         // Masked, an interrupt still ends the sleep, but is served after the time was taken.
         cortex_m::interrupt::disable();
-        let before = clock::counts();
-        cortex_m::asm::wfi();
-        IDLE.fetch_add(clock::counts().wrapping_sub(before), Ordering::Relaxed);
+        IDLE.fetch_add(clock::rest(), Ordering::Relaxed);
         // SAFETY: nothing here relies on the mask.
         unsafe { cortex_m::interrupt::enable() };
     }

@@ -1,4 +1,5 @@
-//! The serial lines of the emulated machine, by interrupt: one to the laptop, one to the Bluetooth controller.
+//! The serial lines of the emulated machine, by interrupt: one to the laptop, one to the Bluetooth controller, and the
+//! registers of a third for [`pace`](super::pace).
 //!
 //! Registers: Arm Cortex-M System Design Kit, technical reference manual (DDI 0479), "APB UART"; addresses: Arm application
 //! note 386. The emulator moves a byte at once, whatever the baud rate: sending is paced here to that of a real line.
@@ -27,9 +28,52 @@ const RECEIVE_INTERRUPT: u32 = 1 << 3;
 /// A byte is ten bits at 921 600 baud.
 const BYTES_PER_S: u64 = 92_160;
 
+/// The registers of a UART, by the address of the first.
+pub struct Uart(usize);
+
+impl Uart {
+    /// The third, which only [`pace`](super::pace) uses.
+    pub const THIRD: Self = Self(0x4000_6000);
+
+    fn write(&self, register: usize, value: u32) {
+        // SAFETY: the register is inside the UART's block, which has one user.
+        unsafe { (self.0 as *mut u32).add(register).write_volatile(value) }
+    }
+
+    fn read(&self, register: usize) -> u32 {
+        // SAFETY: as above.
+        unsafe { (self.0 as *mut u32).add(register).read_volatile() }
+    }
+
+    /// Switches it on, with an interrupt for each byte that comes.
+    pub fn start(&self) {
+        self.write(DIVIDER, 27);
+        self.write(CONTROL, SEND_ENABLE | RECEIVE_ENABLE | RECEIVE_INTERRUPT);
+    }
+
+    /// Sends a byte if there is room for it.
+    pub fn offer(&self, byte: u8) -> bool {
+        let room = self.read(STATE) & STATE_FULL == 0;
+        if room {
+            self.write(DATA, u32::from(byte));
+        }
+        room
+    }
+
+    /// No interrupt waits any more; a byte that comes later raises it again.
+    pub fn clear(&self) {
+        self.write(CLEAR, 0b10);
+    }
+
+    /// Takes a byte that has come.
+    pub fn take(&self) -> Option<u8> {
+        (self.read(STATE) & STATE_RECEIVED != 0).then(|| self.read(DATA) as u8)
+    }
+}
+
 /// A serial line.
 pub struct Line {
-    registers: usize,
+    uart: Uart,
     interrupt: Irq,
     /// Who is at the other end waits while there is no room.
     handshake: bool,
@@ -47,24 +91,13 @@ pub static LAPTOP: Line = Line::new(0x4000_4000, Irq::UART_RECEIVED, false);
 pub static HCI: Line = Line::new(0x4000_5000, Irq::HCI_RECEIVED, true);
 
 impl Line {
-    const fn new(registers: usize, interrupt: Irq, handshake: bool) -> Self {
-        Self { registers, interrupt, handshake, received: Pipe::new(), used: AtomicBool::new(false) }
-    }
-
-    fn write(&self, register: usize, value: u32) {
-        // SAFETY: the register is inside the UART's block, which only this line uses.
-        unsafe { (self.registers as *mut u32).add(register).write_volatile(value) }
-    }
-
-    fn read(&self, register: usize) -> u32 {
-        // SAFETY: as above.
-        unsafe { (self.registers as *mut u32).add(register).read_volatile() }
+    const fn new(address: usize, interrupt: Irq, handshake: bool) -> Self {
+        Self { uart: Uart(address), interrupt, handshake, received: Pipe::new(), used: AtomicBool::new(false) }
     }
 
     /// Switches the line on.
     pub fn start(&'static self) -> (Receiver, Sender) {
-        self.write(DIVIDER, 27);
-        self.write(CONTROL, SEND_ENABLE | RECEIVE_ENABLE | RECEIVE_INTERRUPT);
+        self.uart.start();
         interrupt::enable(self.interrupt, 64);
         (Receiver(self), Sender { line: self, free: Instant::MIN })
     }
@@ -72,7 +105,7 @@ impl Line {
     /// A byte has come. Without room and handshake it is lost.
     pub fn on_received(&self) {
         // First: a byte that comes after the last look must raise it again.
-        self.write(CLEAR, 0b10);
+        self.uart.clear();
         self.used.store(true, Ordering::Relaxed);
         self.take();
     }
@@ -84,8 +117,10 @@ impl Line {
     }
 
     fn take(&self) {
-        while self.read(STATE) & STATE_RECEIVED != 0 && !(self.handshake && self.received.is_full()) {
-            let _ = self.received.try_write(&[self.read(DATA) as u8]);
+        while !(self.handshake && self.received.is_full())
+            && let Some(byte) = self.uart.take()
+        {
+            let _ = self.received.try_write(&[byte]);
         }
     }
 }
@@ -123,8 +158,7 @@ impl Write for Sender {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         Timer::at(self.free).await;
         for &byte in bytes {
-            while self.line.read(STATE) & STATE_FULL != 0 {}
-            self.line.write(DATA, u32::from(byte));
+            while !self.line.uart.offer(byte) {}
         }
         let duration = Duration::from_micros(bytes.len() as u64 * 1_000_000 / BYTES_PER_S);
         self.free = Instant::now() + duration;

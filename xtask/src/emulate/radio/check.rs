@@ -1,11 +1,12 @@
 //! Everything that can be checked of the shoe's Bluetooth without a board.
 
 use super::bus::Bus;
+use super::figures::{Latencies, Lateness, Spread, carried, facts_in_words, number};
 use super::program::{Ports, Radio};
-use super::walk::{Live, Told, Walk};
-use super::{built, folder, forget, machine};
-use crate::emulate::machine::{Running, SHIFT, free_port};
-use crate::emulate::{RECORDINGS, SIMULATED_S, converted, simulated};
+use super::{built, folder, forget};
+use crate::emulate::live::{Live, Walk};
+use crate::emulate::machine::{Running, SHIFT, cable, emulator, free_port, line_to};
+use crate::emulate::{RECORDINGS, SIMULATED_S, converted, file, simulated};
 use crate::process::{self, Failure};
 use crate::{in_root, tools};
 use serde_json::Value;
@@ -14,22 +15,26 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// As many instructions as this machine can, in no real time.
-const FAST: &str = "shift=4,sleep=off";
-/// 99 % of what a step is made of get over the radio within this time. **Units:** ms.
+/// Four times as many instructions in a second, for the part in which the shoe hurries.
+const STRONG: &str = "shift=2,sleep=on,align=on";
+/// So soon after it is on the cable a step is on Bluetooth. **Units:** ms.
 const SOON_MS: f64 = 50.0;
-/// Half of the steps are at a program on Bluetooth so soon after they are at one on the cable, though this machine runs the
-/// processor, the radio and both programs, and perhaps more. **Units:** ms.
-const BUSY_MS: f64 = 2.0 * SOON_MS;
+/// On a machine that lets no thread wait longer than this, each step is; on one that is busier, half of them are, since five
+/// programs have to run one after the other for each. **Units:** ms.
+const QUIET_MS: f64 = 10.0;
 /// For connecting, and for what is sent again. **Units:** s.
-const LONGER_S: u32 = 12;
+const LONGER_S: u64 = 8;
+/// Of the counts of the sensor so much is recorded over the radio. **Units:** s.
+const COUNTS_S: u64 = 20;
 /// For programs that must fail soon.
 const LIMIT: Duration = Duration::from_secs(60);
-/// Out of range for so long by the shoe's clock. **Units:** s.
-const OUT_S: f64 = 600.0;
+/// Out of range for so many times ten seconds by the shoe's clock.
+const OUT_TENS: u8 = 60;
+/// From being out of range to when both ends have lost the connection: longer than its supervision timeout of 2 s.
+const LOST: Duration = Duration::from_secs(4);
 /// Strides of the walk that is longer than that.
 const LONG_WALK_STRIDES: &str = "640";
-/// Packets of garbage from the controller, and from a stranger, whose connection often ends by one.
+/// Packets of garbage from the controller, from a stranger, whose connection often ends by one, and from the paired laptop.
 const GARBAGE: u32 = 400;
 const GARBAGE_ON_AIR: u32 = 100;
 
@@ -43,18 +48,32 @@ struct Scene {
     radio: Radio,
     /// The walk, and how long it takes. **Units:** s.
     counts: PathBuf,
-    seconds: u32,
+    seconds: u64,
+    /// A walk of more than ten minutes, when it has been computed.
+    long: PathBuf,
 }
 
 /// Runs all of it.
 pub fn check() -> Result<(), Failure> {
     tools::QEMU.required()?;
     let mut scene = Scene::prepare()?;
-    scene.strangers_are_refused()?;
-    scene.both_lines_get_every_step()?;
-    scene.raw_counts_come()?;
-    scene.garbage_stops_nothing()?;
-    scene.out_of_range_and_back()
+    let (sohle, folder) = (scene.sohle.clone(), scene.folder.join("long"));
+    // Computed while the first part waits, and before delays are measured.
+    let long = std::thread::spawn(move || long_walk(&sohle, &folder));
+    timed(&mut scene, Scene::strangers_are_refused)?;
+    scene.long = long.join().map_err(|_| wrong("the long walk was not computed"))??;
+    timed(&mut scene, Scene::both_lines_get_every_step)?;
+    timed(&mut scene, Scene::raw_counts_come)?;
+    timed(&mut scene, Scene::garbage_stops_nothing)?;
+    timed(&mut scene, Scene::out_of_range_and_back)
+}
+
+/// A part of the check, with the time that it takes.
+fn timed(scene: &mut Scene, part: fn(&mut Scene) -> Result<(), Failure>) -> Result<(), Failure> {
+    let begun = Instant::now();
+    part(scene)?;
+    println!("  (in {:.0} s)", begun.elapsed().as_secs_f64());
+    Ok(())
 }
 
 fn wrong(what: impl Into<String>) -> Failure {
@@ -81,17 +100,19 @@ impl Scene {
         let counts = converted(&sohle, &folder, &walk, profile)?;
         let bus = Bus::start(&folder)?;
         let radio = Radio::start(Ports::free()?, &keys, Some(&bus))?;
-        Ok(Self { sohle, program, folder, flash, bus, radio, counts, seconds })
+        Ok(Self { sohle, program, folder, flash, bus, radio, counts, seconds: seconds.into(), long: PathBuf::new() })
     }
 
     /// The shoe after its power has come, and the port of its cable.
-    fn shoe(&self, pace: &str) -> Result<(Running, u16), Failure> {
-        let cable = free_port()?;
+    fn shoe(&self, speed: &str) -> Result<(Running, u16), Failure> {
+        let port = free_port()?;
         let files = [self.counts.as_path(), self.flash.as_path()];
-        let running = Running::of(machine(pace, cable, self.radio.ports.hci, &files, &self.program))?;
-        // The cable's port opens with the emulator.
-        sleep(Duration::from_secs(2));
-        Ok((running, cable))
+        let mut running = Running::of(|pace| {
+            let lines = [cable(port, false), line_to(self.radio.ports.hci), pace];
+            emulator(speed, &lines, &files, &self.program)
+        })?;
+        running.pace.wait_until(1)?;
+        Ok((running, port))
     }
 
     /// What `sohle` says with these words, and whether it was content.
@@ -111,8 +132,15 @@ impl Scene {
         }
     }
 
-    fn live(&self, address: &str, seconds: u32, record: Option<&Path>) -> Result<Live, Failure> {
-        Live::start(&self.sohle, address, seconds, record, &self.bus)
+    /// A `sohle live` that listens, and records the counts of the sensor if a file is named.
+    fn live(&self, address: &str, record: Option<&Path>) -> Result<Live, Failure> {
+        Live::start(&self.sohle, address, |command| {
+            match record {
+                Some(path) => command.arg("--raw").arg("--out").arg(path),
+                None => command.arg("--no-record"),
+            };
+            self.bus.seen_by(command);
+        })
     }
 
     /// What was recorded, computed again.
@@ -153,13 +181,16 @@ impl Scene {
 
     /// After a power cut, with the cable and Bluetooth at once: every step on both, the same, once, soon.
     fn both_lines_get_every_step(&mut self) -> Result<(), Failure> {
-        let (_running, cable) = self.shoe(SHIFT)?;
+        let (mut running, cable) = self.shoe(SHIFT)?;
         let recording = self.folder.join("cable.mcap");
         forget(&recording)?;
-        let seconds = self.seconds + LONGER_S;
-        let wired = self.live(&format!("tcp:127.0.0.1:{cable}"), seconds, Some(&recording))?;
-        let wireless = self.live("ble:any", seconds, None)?;
-        sleep(Duration::from_secs(u64::from(self.seconds)));
+        let begun = running.pace.seconds()?;
+        let wired = self.live(&format!("tcp:127.0.0.1:{cable}"), Some(&recording))?;
+        let wireless = self.live("ble:any", None)?;
+        running.pace.wait_until(begun + LONGER_S)?;
+        let lateness = Lateness::measure();
+        running.pace.wait_until(begun + self.seconds + LONGER_S)?;
+        let late = lateness.longest_ms();
         let figures = self.radio.order("figures")?;
         let (wired, wireless) = (wired.finish()?, wireless.finish()?);
         whole(&wired, "the cable")?;
@@ -169,28 +200,36 @@ impl Scene {
         println!("cable and Bluetooth at once: {steps} steps on both, the same and once");
         println!("  {}", self.again(&recording)?);
         let latencies = Latencies::of(&wired, &wireless);
-        println!("  step after the end of its stance, on the cable: {}", latencies.wired);
-        println!("  the same on Bluetooth: {}", latencies.wireless);
-        println!("  of which Bluetooth: {}", latencies.more);
+        let (quiet, Spread { median, longest, .. }) = (late <= QUIET_MS, &latencies.more);
+        if quiet {
+            println!("  step after the end of its stance, on the cable: {}", latencies.wired);
+            println!("  the same on Bluetooth: {}", latencies.wireless);
+        } else {
+            println!(
+                "  (this machine is too busy for the shoe's clock to be that of the room, by which delays are told)"
+            );
+        }
+        println!("  step on Bluetooth after the same on the cable: {}", latencies.more);
         println!("  on the radio: {}", carried(&figures));
-        // The longest is that of a program which had to wait for this machine, not of the radio.
-        let (median, radio) = (latencies.more.median, number(&figures, "wait_99_ms"));
-        if median > BUSY_MS || radio > SOON_MS {
-            return Err(wrong(format!("Bluetooth takes {median:.1} ms for a step, {radio:.1} ms of it on the radio")));
+        let (what, is) = if quiet { ("the longest", *longest) } else { ("half of them", *median) };
+        println!("  this machine let a thread wait for {late:.1} ms at most, so {what} must be within {SOON_MS} ms");
+        if is > SOON_MS {
+            return Err(wrong(format!("Bluetooth takes {is:.1} ms for a step")));
         }
         Ok(())
     }
 
     /// The counts of the sensor at 2 kHz over the radio, as far as they come.
     fn raw_counts_come(&mut self) -> Result<(), Failure> {
-        let (_running, _) = self.shoe(SHIFT)?;
+        let (mut running, _) = self.shoe(SHIFT)?;
         let recording = self.folder.join("radio.mcap");
         forget(&recording)?;
-        let live = self.live("ble:any", self.seconds + LONGER_S, Some(&recording))?;
-        sleep(Duration::from_secs(u64::from(LONGER_S)));
+        let live = self.live("ble:any", Some(&recording))?;
+        let begun = running.pace.seconds()? + LONGER_S;
+        running.pace.wait_until(begun)?;
         // What was before the counts is not of interest.
         self.radio.ask("figures")?;
-        sleep(Duration::from_secs(u64::from(self.seconds - LONGER_S)));
+        running.pace.wait_until(begun + COUNTS_S)?;
         let figures = self.radio.order("figures")?;
         let walk = live.finish()?;
         whole(&walk, "Bluetooth with counts")?;
@@ -202,13 +241,14 @@ impl Scene {
         Ok(())
     }
 
-    /// Arbitrary packets from the controller and a stranger, and a stranger's commands, while the cable records.
+    /// Arbitrary packets from the controller, from a stranger and from the laptop that has paired, and a stranger's commands,
+    /// while the cable records.
     fn garbage_stops_nothing(&mut self) -> Result<(), Failure> {
-        let (_running, cable) = self.shoe(SHIFT)?;
+        let (mut running, cable) = self.shoe(SHIFT)?;
         let recording = self.folder.join("garbage.mcap");
         forget(&recording)?;
-        let live = self.live(&format!("tcp:127.0.0.1:{cable}"), self.seconds + LONGER_S, Some(&recording))?;
-        sleep(Duration::from_secs(4));
+        let begun = running.pace.seconds()?;
+        let live = self.live(&format!("tcp:127.0.0.1:{cable}"), Some(&recording))?;
         self.radio.order("stranger-commands")?;
         let stranger = format!("tcp:127.0.0.1:{}", self.radio.ports.stranger);
         let (content, said) = self.sohle(&["command", &stranger, "reset"])?;
@@ -216,15 +256,22 @@ impl Scene {
             return Err(wrong(format!("a stranger's command was carried out: {said}")));
         }
         self.radio.ask("stranger-leave")?;
-        let sent = self.radio.order(&format!("garbage-peer {GARBAGE_ON_AIR}"))?;
+        let stranger = self.radio.order(&format!("garbage-stranger {GARBAGE_ON_AIR}"))?;
+        let laptop = self.radio.order(&format!("garbage-laptop {GARBAGE_ON_AIR}"))?;
         self.radio.order(&format!("garbage-controller {GARBAGE}"))?;
+        running.pace.wait_until(begun + self.seconds + LONGER_S)?;
         let walk = live.finish()?;
         whole(&walk, "the cable under garbage")?;
-        let (times, steps) = (number(&sent, "connections"), walk.steps.len());
+        let times = |sent: &Value| number(sent, "connections");
         println!(
-            "a stranger's commands were not carried out; {GARBAGE_ON_AIR} packets of garbage from a stranger, over {times}"
+            "a stranger's commands were not carried out; {GARBAGE_ON_AIR} packets of garbage from a stranger over"
         );
-        println!("  connections, and {GARBAGE} from the controller cost no step: {steps} came");
+        println!(
+            "  {} connections, {GARBAGE_ON_AIR} from the paired laptop over {}, and {GARBAGE} from the controller",
+            times(&stranger),
+            times(&laptop)
+        );
+        println!("  cost no step: {} came", walk.steps.len());
         println!("  {}", self.again(&recording)?);
         // Sooner or later it is back.
         let facts = (0..3).map(|_| self.radio.order("connect")).find_map(Result::ok);
@@ -234,44 +281,63 @@ impl Scene {
         Ok(())
     }
 
-    /// Ten minutes of walking out of range: every step comes afterwards, once.
+    /// Ten minutes of walking out of range: every step comes afterwards, once, as the cable had it at once.
+    ///
+    /// While the laptop is away the shoe hurries: its ten minutes take as long as this machine has to compute for them.
+    /// Whenever something passes over the radio, the shoe's time is the room's.
     fn out_of_range_and_back(&mut self) -> Result<(), Failure> {
-        let walk = self.folder.join("long.mcap");
-        let mut command = Command::new(&self.sohle);
-        command.args(["simulate", "--gait", "walk", "--strides", LONG_WALK_STRIDES, "--out"]).arg(&walk);
-        process::read(&mut command)?;
-        self.counts = converted(&self.sohle, &self.folder, &walk, None)?;
-        let (_running, _) = self.shoe(FAST)?;
-        let live = self.live("ble:any", 200, None)?;
-        sleep(Duration::from_secs(15));
-        let out = Instant::now();
+        self.counts.clone_from(&self.long);
+        let (mut running, cable) = self.shoe(STRONG)?;
+        let wireless = self.live("ble:any", None)?;
+        let wired = self.live(&format!("tcp:127.0.0.1:{cable}"), None)?;
+        let near = running.pace.seconds()? + 2 * LONGER_S;
+        running.pace.wait_until(near)?;
         self.radio.order("out")?;
-        sleep(Duration::from_secs(120));
-        let back = Instant::now();
+        sleep(LOST);
+        if self.radio.ask("figures")?.get("fault").is_none() {
+            return Err(wrong("the laptop is connected though it is out of range"));
+        }
+        let out = Instant::now();
+        let out_s = running.pace.seconds()?;
+        running.pace.hurry(OUT_TENS)?;
+        let (back, back_s) = (Instant::now(), running.pace.seconds()?);
         self.radio.order("in")?;
-        let walk = live.finish()?;
-        whole(&walk, "Bluetooth after a time out of range")?;
-        let last = |came: &dyn Fn(Instant) -> bool| {
-            walk.steps.values().filter(|step| came(step.at)).map(|step| step.stance_end_us).max()
-        };
-        let before = last(&|at| at < out + Duration::from_secs(1));
-        let kept = last(&|at| at > back && at < back + Duration::from_secs(20));
-        let (Some(before), Some(kept)) = (before, kept) else {
-            return Err(wrong("no steps came before or after the time out of range"));
-        };
-        let away_s = (kept - before) as f64 * 1e-6;
-        let waited = walk.steps.values().filter(|step| (before + 1..=kept).contains(&step.stance_end_us)).count();
+        running.pace.wait_until(back_s + 2 * LONGER_S)?;
+        let (wired, wireless) = (wired.finish()?, wireless.finish()?);
+        whole(&wired, "the cable")?;
+        whole(&wireless, "Bluetooth after a time out of range")?;
+        let steps = same(&wired, &wireless)?;
+        let came =
+            |from: Instant, to: Instant| wireless.steps.values().filter(|step| (from..to).contains(&step.at)).count();
+        let away = wired.steps.values().filter(|step| (out..back).contains(&step.at)).count();
         println!(
-            "out of range for {away_s:.0} s by the shoe's clock (which ran faster than the room's) and back: {waited} steps"
+            "out of range for {} s by the shoe's clock ({:.0} s of the room's) and back: {away} steps were made meanwhile",
+            back_s - out_s,
+            (back - out).as_secs_f64()
         );
-        println!("  waited and came, each once; {} in all", walk.steps.len());
-        if away_s < OUT_S {
+        println!("  and came then, each once and as the cable had it at once; {steps} on both in all");
+        // A stride takes no longer than 1.2 s.
+        let least = usize::from(OUT_TENS) * 10 * 10 / 12;
+        if came(out, back) > 0 || away < least {
+            let heard = came(out, back);
             return Err(wrong(format!(
-                "only {away_s:.0} s of {OUT_S:.0} have passed out of range: this machine is too slow"
+                "out of range, {heard} steps came by Bluetooth and {away} of {least} on the cable"
             )));
         }
         Ok(())
     }
+}
+
+/// Counts of a walk of more than ten minutes.
+fn long_walk(sohle: &Path, folder: &Path) -> Result<PathBuf, Failure> {
+    std::fs::create_dir_all(folder).map_err(|source| file(folder, source))?;
+    let walk = folder.join("long.mcap");
+    let mut command = Command::new(sohle);
+    command.args(["simulate", "--gait", "walk", "--strides", LONG_WALK_STRIDES, "--out"]).arg(&walk);
+    process::read(&mut command)?;
+    let counts = converted(sohle, folder, &walk, None)?;
+    forget(&walk)?;
+    Ok(counts)
 }
 
 /// Every attempt of the stranger was refused.
@@ -317,81 +383,6 @@ fn same(wired: &Walk, wireless: &Walk) -> Result<usize, Failure> {
     Ok(left.len())
 }
 
-/// Times of many steps. **Units:** ms.
-struct Spread {
-    median: f64,
-    almost_all: f64,
-    longest: f64,
-}
-
-impl Spread {
-    fn of(values: impl Iterator<Item = f64>) -> Self {
-        let mut values: Vec<f64> = values.collect();
-        values.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let index = (values.len() as f64 * share) as usize;
-            values.get(index.min(values.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
-        };
-        Self { median: at(0.5), almost_all: at(0.99), longest: at(1.0) }
-    }
-}
-
-impl std::fmt::Display for Spread {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { median, almost_all, longest } = self;
-        write!(out, "{median:.1} ms (median), {almost_all:.1} ms (99 %), {longest:.1} ms (longest)")
-    }
-}
-
-/// How late steps come. The clock of the shoe is known well over the cable only: what Bluetooth takes longer is the time
-/// between the lines of the two programs.
-struct Latencies {
-    wired: Spread,
-    wireless: Spread,
-    more: Spread,
-}
-
-impl Latencies {
-    fn of(wired: &Walk, wireless: &Walk) -> Self {
-        let pairs = || wired.steps.iter().filter_map(|(key, told)| Some((told, wireless.steps.get(key)?)));
-        let more = |(wired, wireless): (&Told, &Told)| {
-            let later = wireless.at.saturating_duration_since(wired.at).as_secs_f64();
-            (later - wired.at.saturating_duration_since(wireless.at).as_secs_f64()) * 1e3
-        };
-        Self {
-            wired: Spread::of(wired.steps.values().filter_map(|told| told.delay_ms)),
-            wireless: Spread::of(pairs().filter_map(|pair| Some(pair.0.delay_ms? + more(pair)))),
-            more: Spread::of(pairs().map(more)),
-        }
-    }
-}
-
-fn number(value: &Value, name: &str) -> f64 {
-    value.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN)
-}
-
-fn facts_in_words(facts: &Value) -> String {
-    let phy = facts.get("phy").and_then(Value::as_str).unwrap_or("?");
-    format!(
-        "interval {} ms, latency {}, MTU {}, {} bytes to a packet, {phy}",
-        number(facts, "interval_ms"),
-        number(facts, "latency"),
-        number(facts, "mtu"),
-        number(facts, "octets")
-    )
-}
-
-fn carried(figures: &Value) -> String {
-    format!(
-        "{:.1} kB/s from the shoe; a packet waited {:.1} ms (median), {:.1} ms (99 %), {:.1} ms (longest) for its turn ({})",
-        number(figures, "from_shoe") / number(figures, "seconds") * 1e-3,
-        number(figures, "wait_median_ms"),
-        number(figures, "wait_99_ms"),
-        number(figures, "wait_longest_ms"),
-        facts_in_words(figures)
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -407,12 +398,5 @@ mod tests {
         said["write"] = "allowed".into();
         assert!(refused_everything(&said).unwrap_err().to_string().starts_with("a stranger was not refused: write "));
         assert!(refused_everything(&json!({ "notified": 0 })).is_err());
-    }
-
-    #[test]
-    fn a_spread_is_of_sorted_values() {
-        let spread = Spread::of((0..200).rev().map(f64::from));
-        assert_eq!((spread.median, spread.almost_all, spread.longest), (100.0, 198.0, 199.0));
-        assert!(Spread::of(std::iter::empty()).median.is_nan());
     }
 }

@@ -2,20 +2,19 @@
 
 mod bus;
 mod check;
+mod figures;
 mod program;
 mod python;
-mod walk;
 
 pub use check::check;
 
 use super::file;
-use super::machine::{SHIFT, build, emulator};
+use super::machine::{SHIFT, build, cable, emulator, line_to};
 use crate::process::{self, Failure};
 use crate::{device, in_root};
 use bus::Bus;
 use program::{Ports, Radio};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// The firmware with Bluetooth, beside the one without, which is built in the same place.
 pub fn built(folder: &Path) -> Result<PathBuf, Failure> {
@@ -25,14 +24,8 @@ pub fn built(folder: &Path) -> Result<PathBuf, Failure> {
     Ok(program)
 }
 
-/// The emulator with the shoe in it: a port for its cable, one for its controller, and a file for its flash.
-fn machine(pace: &str, cable: u16, controller: u16, files: &[&Path; 2], program: &Path) -> Command {
-    let lines = [format!("tcp:127.0.0.1:{cable},server=on,wait=off"), format!("tcp:127.0.0.1:{controller}")];
-    emulator(pace, &lines, files, program)
-}
-
 /// Runs shoe, radio and laptop until they are stopped, and tells what can be typed.
-pub fn run(folder: &Path, counts: &Path, cable: u16) -> Result<(), Failure> {
+pub fn run(folder: &Path, counts: &Path, port: u16) -> Result<(), Failure> {
     let program = built(folder)?;
     let bus = Bus::start(folder)?;
     let radio = Radio::start(Ports::free()?, &folder.join("laptop.json"), Some(&bus))?;
@@ -40,11 +33,12 @@ pub fn run(folder: &Path, counts: &Path, cable: u16) -> Result<(), Failure> {
         "the shoe waits for a laptop and walks as soon as one is there, on its cable or on Bluetooth. This terminal's laptop"
     );
     println!("is not this machine's: what stands for BlueZ is on a bus of its own. In another terminal, run");
-    println!("  cargo run --release -- pair tcp:127.0.0.1:{cable}");
+    println!("  cargo run --release -- pair tcp:127.0.0.1:{port}");
     println!("  DBUS_SYSTEM_BUS_ADDRESS={} cargo run --release -- live ble:any", bus.address());
     println!("The shoe's flash and the laptop's keys stay in {} for the next time; Ctrl-C ends it", folder.display());
     let flash = folder.join("flash.bin");
-    process::run(&mut machine(SHIFT, cable, radio.ports.hci, &[counts, &flash], &program))
+    let lines = [cable(port, false), line_to(radio.ports.hci)];
+    process::run(&mut emulator(SHIFT, &lines, &[counts, &flash], &program))
 }
 
 /// A file of an earlier run.

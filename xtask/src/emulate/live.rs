@@ -1,7 +1,6 @@
 //! A `sohle live` that runs, with the time at which each of its lines came.
 
-use super::super::Summary;
-use super::bus::Bus;
+use super::Summary;
 use crate::process::{self, Failure};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -9,7 +8,12 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::{self, JoinHandle};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// Asked to end, it does within this time, farewell to the shoe included.
+const FAREWELL: Duration = Duration::from_secs(30);
+/// It ends after this time, should nobody be left to ask it to. **Units:** s.
+const LONGEST_S: &str = "900";
 
 /// A step as it was told.
 pub struct Told {
@@ -17,8 +21,6 @@ pub struct Told {
     pub at: Instant,
     /// From the end of the stance by the clocks of shoe and laptop. **Units:** ms.
     pub delay_ms: Option<f64>,
-    /// End of the stance on the shoe's clock. **Units:** microseconds.
-    pub stance_end_us: i64,
     /// Everything that the shoe said of it.
     pub content: String,
 }
@@ -39,15 +41,11 @@ pub struct Live {
 }
 
 impl Live {
-    /// Starts it on an address for so many seconds, with the counts of the sensor recorded if a file is named.
-    pub fn start(sohle: &Path, address: &str, seconds: u32, record: Option<&Path>, bus: &Bus) -> Result<Self, Failure> {
+    /// Starts it on an address, with `more` of its arguments and of its surroundings.
+    pub fn start(sohle: &Path, address: &str, more: impl FnOnce(&mut Command)) -> Result<Self, Failure> {
         let mut command = Command::new(sohle);
-        command.args(["live", address, "--for", &seconds.to_string(), "--format", "json", "--headless"]);
-        match record {
-            Some(path) => command.arg("--raw").arg("--out").arg(path),
-            None => command.arg("--no-record"),
-        };
-        bus.seen_by(&mut command);
+        command.args(["live", address, "--for", LONGEST_S, "--format", "json", "--headless"]);
+        more(&mut command);
         let started = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
         let mut child = started.map_err(|source| Failure::NotStarted { program: process::typed(&command), source })?;
         let (out, err) = (child.stdout.take(), child.stderr.take());
@@ -64,8 +62,11 @@ impl Live {
         Ok(Self { child, lines: Some(lines), errors: Some(errors) })
     }
 
-    /// Waits for its end and tells what it heard.
+    /// Ends it as Ctrl-C does and tells what it heard.
     pub fn finish(mut self) -> Result<Walk, Failure> {
+        if process::interrupt(&mut self.child, FAREWELL)?.is_none() {
+            return Err(Failure::Found("sohle live does not end by Ctrl-C".into()));
+        }
         let lines = self.lines.take().and_then(|lines| lines.join().ok()).unwrap_or_default();
         let errors = self.errors.take().and_then(|errors| errors.join().ok()).unwrap_or_default();
         let failed = |why: &str| Failure::Found(format!("{why}; sohle live said: {}", errors.trim()));
@@ -97,9 +98,8 @@ fn step(at: Instant, line: &str) -> Option<((u64, u64), Told)> {
         return None;
     }
     let key = (object.get("boot")?.as_u64()?, object.get("id")?.as_u64()?);
-    let stance_end_us = object.get("stance_end_us")?.as_i64()?;
     let delay_ms = object.as_object_mut()?.remove("delay_ms").and_then(|delay| delay.as_f64());
-    Some((key, Told { at, delay_ms, stance_end_us, content: object.to_string() }))
+    Some((key, Told { at, delay_ms, content: object.to_string() }))
 }
 
 #[cfg(test)]
@@ -113,7 +113,7 @@ mod tests {
         };
         let now = Instant::now();
         let ((key, soon), (_, late)) = (step(now, &line("12.5")).unwrap(), step(now, &line("null")).unwrap());
-        assert_eq!((key, soon.stance_end_us, soon.delay_ms, late.delay_ms), ((7, 3), 5_000, Some(12.5), None));
+        assert_eq!((key, soon.delay_ms, late.delay_ms), ((7, 3), Some(12.5), None));
         assert_eq!(soon.content, late.content);
         assert!(step(now, r#"{"event":"summary","steps":3}"#).is_none());
     }
