@@ -164,7 +164,6 @@ fn charge(volts: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sohle_shared::wire::message::LinkCounters;
 
     #[test]
     fn the_charge_is_between_empty_and_full() {
@@ -173,52 +172,8 @@ mod tests {
 
     #[test]
     fn the_longest_status_fits() {
-        let most = sohle_shared::bmx055::DieCounters {
-            frames: u32::MAX,
-            overruns: u32::MAX,
-            invalid_frames: u32::MAX,
-            missed_interrupts: u32::MAX,
-            bus_errors: u32::MAX,
-            bad_ids: u32::MAX,
-            readback_errors: u32::MAX,
-            restarts: u32::MAX,
-        };
-        let tracker = sohle_shared::tracker::Counters {
-            samples: u64::MAX,
-            not_finite: u32::MAX,
-            repeated: u32::MAX,
-            backwards: u32::MAX,
-            gaps: u32::MAX,
-            accel_clipped: u32::MAX,
-            gyro_clipped: u32::MAX,
-            repaired: u32::MAX,
-            restarts: u32::MAX,
-        };
-        let frames = sohle_shared::wire::frame::FrameCounters {
-            good: u32::MAX,
-            stuffing: u32::MAX,
-            checksum: u32::MAX,
-            too_long: u32::MAX,
-            unknown: u32::MAX,
-        };
-        let link = LinkCounters { frames, steps_resent: u32::MAX, steps_dropped: u32::MAX, messages_dropped: u32::MAX };
-        let status = Status {
-            time: sohle_shared::time::Micros(i64::MIN),
-            load: u16::MAX,
-            lateness_us: u32::MAX,
-            temperature: Some(20.0),
-            battery: Some(4.0),
-            stack: u32::MAX,
-            sleeps: u16::MAX,
-            waiting: u16::MAX,
-            accel: most,
-            gyro: most,
-            tracker,
-            link,
-            ..Status::default()
-        };
         let radio = Radio::new();
-        radio.tell(&status);
+        radio.tell(&Status::longest());
         let length = radio.status.lock(|bytes| bytes.borrow().len());
         assert!(length > 150 && length <= STATUS_MAX, "{length}");
     }

@@ -183,16 +183,6 @@ fn the_bytes_of_every_message_are_as_they_were() {
 fn the_longest_messages_fit_their_buffers() {
     let longest = |n| core::iter::repeat_n('x', n).collect::<String>();
     let far = Micros(i64::MIN);
-    let counters = |n| DieCounters {
-        frames: n,
-        overruns: n,
-        invalid_frames: n,
-        missed_interrupts: n,
-        bus_errors: n,
-        bad_ids: n,
-        readback_errors: n,
-        restarts: n,
-    };
     let mut farthest = raw([i16::MIN; 3]);
     farthest.number = u32::MAX;
     if let RawItem::Batch(batch) = &mut farthest.item {
@@ -216,41 +206,7 @@ fn the_longest_messages_fit_their_buffers() {
         })),
         FromShoe::Raw(farthest),
         FromShoe::Attitude(Attitude { time: far, ..attitude() }),
-        FromShoe::Status(Status {
-            time: far,
-            load: u16::MAX,
-            lateness_us: u32::MAX,
-            battery: Some(4.2),
-            stack: u32::MAX,
-            sleeps: u16::MAX,
-            waiting: u16::MAX,
-            accel: counters(u32::MAX),
-            gyro: counters(u32::MAX),
-            tracker: Counters {
-                samples: u64::MAX,
-                not_finite: u32::MAX,
-                repeated: u32::MAX,
-                backwards: u32::MAX,
-                gaps: u32::MAX,
-                accel_clipped: u32::MAX,
-                gyro_clipped: u32::MAX,
-                repaired: u32::MAX,
-                restarts: u32::MAX,
-            },
-            link: LinkCounters {
-                frames: FrameCounters {
-                    good: u32::MAX,
-                    stuffing: u32::MAX,
-                    checksum: u32::MAX,
-                    too_long: u32::MAX,
-                    unknown: u32::MAX,
-                },
-                steps_resent: u32::MAX,
-                steps_dropped: u32::MAX,
-                messages_dropped: u32::MAX,
-            },
-            ..status()
-        }),
+        FromShoe::Status(Status::longest()),
         FromShoe::Log(Log { time: far, text: text(&longest(999)), ..log() }),
     ];
     for message in &messages {

@@ -228,6 +228,53 @@ pub struct Status {
     pub link: LinkCounters,
 }
 
+impl Status {
+    /// The one whose message is longest: a buffer for a status must hold it.
+    pub const fn longest() -> Self {
+        const MOST: u32 = u32::MAX;
+        let die = DieCounters {
+            frames: MOST,
+            overruns: MOST,
+            invalid_frames: MOST,
+            missed_interrupts: MOST,
+            bus_errors: MOST,
+            bad_ids: MOST,
+            readback_errors: MOST,
+            restarts: MOST,
+        };
+        let tracker = Counters {
+            samples: u64::MAX,
+            not_finite: MOST,
+            repeated: MOST,
+            backwards: MOST,
+            gaps: MOST,
+            accel_clipped: MOST,
+            gyro_clipped: MOST,
+            repaired: MOST,
+            restarts: MOST,
+        };
+        let frames = FrameCounters { good: MOST, stuffing: MOST, checksum: MOST, too_long: MOST, unknown: MOST };
+        let link = LinkCounters { frames, steps_resent: MOST, steps_dropped: MOST, messages_dropped: MOST };
+        Self {
+            time: Micros(i64::MIN),
+            state: State::Tracking,
+            load: u16::MAX,
+            lateness_us: MOST,
+            temperature: Some(f32::MAX),
+            battery: Some(f32::MAX),
+            stack: MOST,
+            reset: ResetReason::PowerOn,
+            asleep: true,
+            sleeps: u16::MAX,
+            waiting: u16::MAX,
+            accel: die,
+            gyro: die,
+            tracker,
+            link,
+        }
+    }
+}
+
 /// How much a line of the log matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Schema)]
 pub enum Level {
