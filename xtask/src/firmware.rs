@@ -16,6 +16,9 @@ use std::process::Command;
 /// Where the firmware is.
 const FOLDER: &str = "firmware/shoe";
 
+/// Where the programs for the emulator are.
+const EMULATOR: &str = "firmware/emulator";
+
 /// Its program.
 const SHOE: &str = "shoe";
 
@@ -199,14 +202,17 @@ fn build(board: Board, ble: bool, what: &[&str]) -> Result<(), Failure> {
     process::run(command.args(what).args(["--features", &board.features(ble)]))
 }
 
-/// Lints the firmware for all boards, without and with Bluetooth, where there is a clippy for the target.
+/// Lints the firmware for all boards and for the emulator, without and with Bluetooth, where there is a clippy for the target.
 pub fn lint() -> Result<(), Failure> {
-    for (board, ble) in Board::ALL.into_iter().flat_map(|board| [(board, false), (board, true)]) {
-        let Some(mut command) = Route::find()?.clippy(&in_root(FOLDER)) else {
+    let boards = Board::ALL.into_iter().flat_map(|board| [board.features(false), board.features(true)]);
+    let boards = boards.map(|features| (FOLDER, features));
+    let emulator = ["documented", "ble"].map(|features| (EMULATOR, features.into()));
+    for (folder, features) in boards.chain(emulator) {
+        let Some(mut command) = Route::find()?.clippy(&in_root(folder)) else {
             println!("no clippy for {}: the firmware is not linted", device::TARGET);
             return Ok(());
         };
-        process::run(command.args(["--features", &board.features(ble), "--", "-D", "warnings"]))?;
+        process::run(command.args(["--features", &features, "--", "-D", "warnings"]))?;
     }
     Ok(())
 }

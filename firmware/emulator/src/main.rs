@@ -48,5 +48,7 @@ fn main() -> ! {
     }
     parts::measure();
     debug::exit(debug::EXIT_SUCCESS);
-    loop {}
+    loop {
+        cortex_m::asm::nop();
+    }
 }
