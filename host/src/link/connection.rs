@@ -69,11 +69,16 @@ impl Connection {
     /// Begins to connect. The port is opened anew as often as needed.
     pub fn open(address: Address) -> Self {
         let clock = HostClock::start();
+        Self::over(Transport::open(address, clock), clock)
+    }
+
+    /// Speaks over this port, by the clock that it was given.
+    pub(super) fn over(transport: Transport, clock: HostClock) -> Self {
         // Another number for every run of the program: the shoe knows its commands by it.
         let nanoseconds = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_nanos());
         let session = (nanoseconds ^ nanoseconds >> 32) as u32 ^ std::process::id().rotate_left(16);
         Self {
-            transport: Transport::open(address, clock),
+            transport,
             outlet: None,
             session: Session::new(session, env!("CARGO_PKG_VERSION")),
             clock,

@@ -92,10 +92,15 @@ pub struct Transport {
 impl Transport {
     /// Begins to open the port at `address`.
     pub fn open(address: Address, clock: HostClock) -> Self {
+        Self::keeping(move || open(&address), clock)
+    }
+
+    /// Begins to open the port that `open` opens.
+    pub(super) fn keeping(open: impl FnMut() -> io::Result<Port> + Send + 'static, clock: HostClock) -> Self {
         let (sender, signals) = sync_channel(WAITING);
         let wanted = Arc::new(AtomicBool::new(true));
         let asked = wanted.clone();
-        thread::spawn(move || keep_open(&address, clock, &sender, &asked));
+        thread::spawn(move || keep_open(open, clock, &sender, &asked));
         Self { signals, wanted }
     }
 
@@ -120,9 +125,15 @@ impl Drop for Transport {
 }
 
 /// Both ends of an open port. Reading returns within [`LOOK`].
-struct Port {
+pub(super) struct Port {
     reader: Box<dyn Read + Send>,
     writer: Box<dyn Write + Send>,
+}
+
+impl From<(bluetooth::pipe::Reader, bluetooth::pipe::Writer)> for Port {
+    fn from((reader, writer): (bluetooth::pipe::Reader, bluetooth::pipe::Writer)) -> Self {
+        Self { reader: Box::new(reader), writer: Box::new(writer) }
+    }
 }
 
 fn open(address: &Address) -> io::Result<Port> {
@@ -143,10 +154,7 @@ fn open(address: &Address) -> io::Result<Port> {
             }
             Err(refusal)
         }
-        Address::Bluetooth(wanted) => {
-            let (reader, writer) = bluetooth::open(wanted)?;
-            Ok(Port { reader: Box::new(reader), writer: Box::new(writer) })
-        }
+        Address::Bluetooth(wanted) => Ok(bluetooth::open(wanted)?.into()),
     }
 }
 
@@ -160,12 +168,17 @@ fn over(stream: TcpStream) -> io::Result<Port> {
 /// Nobody takes the signals any more.
 struct Abandoned;
 
-fn keep_open(address: &Address, clock: HostClock, signals: &SyncSender<Signal>, asked: &AtomicBool) {
+fn keep_open(
+    mut open: impl FnMut() -> io::Result<Port>,
+    clock: HostClock,
+    signals: &SyncSender<Signal>,
+    asked: &AtomicBool,
+) {
     let send = |signal| signals.send(signal).map_err(|_| Abandoned);
     let mut pause = SHORTEST_PAUSE;
     let mut told = BTreeSet::new();
     while asked.load(Ordering::Relaxed) {
-        let outcome = match open(address) {
+        let outcome = match open() {
             Ok(Port { mut reader, writer }) => {
                 told.clear();
                 let wanted = Arc::new(AtomicBool::new(true));

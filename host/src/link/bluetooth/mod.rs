@@ -6,6 +6,8 @@
 //! [`fault`], told in one line with what helps.
 
 pub mod fault;
+#[cfg(test)]
+mod lost;
 pub mod pipe;
 pub mod radio;
 #[cfg(feature = "ble")]
