@@ -51,6 +51,7 @@ pub fn run(arguments: &Arguments) -> bool {
     run.check("firmware", || firmware::run(&firmware::Arguments::default()));
     run.check("bits on a Cortex-M4F", emulator::run);
     run.check("the emulated shoe", emulate::check);
+    run.check("the same on Bluetooth", emulate::radio::check);
     run.check("the window", window::check);
     run.check("cost", bench::run);
     run.check("determinism", determinism::run);

@@ -6,7 +6,7 @@ mod pace;
 mod proxy;
 pub mod radio;
 
-use crate::firmware::{self, Budgets};
+use crate::firmware::{self, Budget, Budgets};
 use crate::process::{self, Failure};
 use crate::{device, in_root, tools};
 use live::{Live, Walk};
@@ -14,6 +14,9 @@ use machine::{INSTRUCTIONS_PER_S, Running, free_port, machine};
 use proxy::Proxy;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+/// What the emulated shoe keeps of the sensor that no board has: the twin and its walk.
+const TWIN: [&str; 2] = ["TWIN", "WALK"];
 
 /// Which walk the shoe takes, and where it is heard.
 #[derive(clap::Args)]
@@ -131,7 +134,7 @@ pub fn check() -> Result<(), Failure> {
     machine::build(&[])?;
     let folder = in_root("target/emulate");
     std::fs::create_dir_all(&folder).map_err(|source| file(&folder, source))?;
-    let statics = firmware::statics_without(&device::binary("sohle-shoe"), &["TWIN", "WALK"])?;
+    let statics = firmware::statics_without(&device::binary("sohle-shoe"), &TWIN)?;
     let mut stack = 0;
     let mut walks = Vec::new();
     for (name, profile, seconds) in RECORDINGS {
@@ -175,13 +178,13 @@ pub fn check() -> Result<(), Failure> {
     command.args(["simulate", "--gait", "walk", "--strides", "10", "--out"]).arg(&walk);
     process::read(&mut command)?;
     let slept = asleep(&sohle, &folder, &converted(&sohle, &folder, &walk, None)?)?;
-    within_budget(statics, stack.max(bad).max(slept))
+    within_budget(statics, stack.max(bad).max(slept), Budgets::read()?.wired)
 }
 
 /// All that the shoe needs of the RAM, against its budget. What the twin and the walk keep is left out, since no board has
 /// either; the stack below the twin's driver is not. It holds the shoe itself, as on the boards.
-fn within_budget(statics: u64, stack: u32) -> Result<(), Failure> {
-    let (ram, budget) = (statics + u64::from(stack), Budgets::read()?.wired.ram);
+fn within_budget(statics: u64, stack: u32, budget: Budget) -> Result<(), Failure> {
+    let (ram, budget) = (statics + u64::from(stack), budget.ram);
     let told = format!("{statics} bytes of statics and {stack} of stack are {ram} of RAM, of {budget}");
     println!("  {told}");
     if stack > 0 && ram <= budget { Ok(()) } else { Err(Failure::Found(told)) }

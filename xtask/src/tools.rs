@@ -57,11 +57,19 @@ pub const XVFB: Tool = Tool { what: "a display in memory", present_by: &["Xvfb"]
 /// What the virtual radio is written in.
 pub const PYTHON: Tool = Tool { what: "Python 3", present_by: &["python3"], packages: &["python3", "python3-venv"] };
 
+/// Its packages in a folder of their own, which Debian has apart; elsewhere they come with it, so nothing requires this.
+const VENV: Tool = Tool {
+    what: "Python's venv with pip",
+    present_by: &["/var/lib/dpkg/info/python3-venv.list"],
+    packages: &["python3-venv"],
+};
+
 /// The bus on which a program and its Bluetooth speak.
 pub const DBUS: Tool = Tool { what: "the D-Bus daemon", present_by: &["dbus-daemon"], packages: &["dbus-daemon"] };
 
 /// Everything.
-pub const ALL: [Tool; 11] = [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD, LAVAPIPE, XVFB, PYTHON, DBUS];
+pub const ALL: [Tool; 12] =
+    [QEMU, VALGRIND, CURL, CXX, DEBIAN_RUST, DEBIAN_CLIPPY, LLD, LAVAPIPE, XVFB, PYTHON, VENV, DBUS];
 
 impl Tool {
     /// Whether the machine has it.

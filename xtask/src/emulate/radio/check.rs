@@ -1,14 +1,14 @@
 //! Everything that can be checked of the shoe's Bluetooth without a board.
 
-use super::bus::Bus;
 use super::figures::{Latencies, Lateness, Spread, carried, facts_in_words, number};
-use super::program::{Ports, Radio};
-use super::{built, folder, forget};
-use crate::emulate::live::{Live, Walk};
-use crate::emulate::machine::{Running, SHIFT, cable, emulator, free_port, line_to};
-use crate::emulate::{RECORDINGS, SIMULATED_S, converted, file, simulated};
+use super::forget;
+use super::scene::{Scene, wrong};
+use crate::emulate::live::Walk;
+use crate::emulate::machine::SHIFT;
+use crate::emulate::{TWIN, converted, file, within_budget};
+use crate::firmware::{self, Budgets};
 use crate::process::{self, Failure};
-use crate::{in_root, tools};
+use crate::tools;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -26,8 +26,6 @@ const QUIET_MS: f64 = 10.0;
 const LONGER_S: u64 = 8;
 /// Of the counts of the sensor so much is recorded over the radio. **Units:** s.
 const COUNTS_S: u64 = 20;
-/// For programs that must fail soon.
-const LIMIT: Duration = Duration::from_secs(60);
 /// Out of range for so many times ten seconds by the shoe's clock.
 const OUT_TENS: u8 = 60;
 /// From being out of range to when both ends have lost the connection: longer than its supervision timeout of 2 s.
@@ -37,21 +35,6 @@ const LONG_WALK_STRIDES: &str = "640";
 /// Packets of garbage from the controller, from a stranger, whose connection often ends by one, and from the paired laptop.
 const GARBAGE: u32 = 400;
 const GARBAGE_ON_AIR: u32 = 100;
-
-/// Shoe, radio and laptop, with what they keep.
-struct Scene {
-    sohle: PathBuf,
-    program: PathBuf,
-    folder: PathBuf,
-    flash: PathBuf,
-    bus: Bus,
-    radio: Radio,
-    /// The walk, and how long it takes. **Units:** s.
-    counts: PathBuf,
-    seconds: u64,
-    /// A walk of more than ten minutes, when it has been computed.
-    long: PathBuf,
-}
 
 /// Runs all of it.
 pub fn check() -> Result<(), Failure> {
@@ -65,7 +48,8 @@ pub fn check() -> Result<(), Failure> {
     timed(&mut scene, Scene::both_lines_get_every_step)?;
     timed(&mut scene, Scene::raw_counts_come)?;
     timed(&mut scene, Scene::garbage_stops_nothing)?;
-    timed(&mut scene, Scene::out_of_range_and_back)
+    timed(&mut scene, Scene::out_of_range_and_back)?;
+    within_budget(firmware::statics_without(&scene.program, &TWIN)?, scene.stack, Budgets::read()?.ble)
 }
 
 /// A part of the check, with the time that it takes.
@@ -76,82 +60,7 @@ fn timed(scene: &mut Scene, part: fn(&mut Scene) -> Result<(), Failure>) -> Resu
     Ok(())
 }
 
-fn wrong(what: impl Into<String>) -> Failure {
-    Failure::Found(what.into())
-}
-
 impl Scene {
-    fn prepare() -> Result<Self, Failure> {
-        let sohle = process::build("dev", "--bin", "sohle")?;
-        let folder = folder()?;
-        let (flash, keys) = (folder.join("flash.bin"), folder.join("laptop.json"));
-        forget(&flash)?;
-        forget(&keys)?;
-        let program = built(&folder)?;
-        let (name, profile, seconds) = RECORDINGS[0];
-        let here = ["recordings", "../shared/recordings"].map(|folder| in_root(folder).join(name));
-        let (walk, profile, seconds) = match here.into_iter().find(|path| path.is_file()) {
-            Some(path) => (path, profile, seconds),
-            None => {
-                println!("{name} is not here; a simulated walk stands for it");
-                (simulated(&sohle, &folder, "demo", 1)?, None, SIMULATED_S)
-            }
-        };
-        let counts = converted(&sohle, &folder, &walk, profile)?;
-        let bus = Bus::start(&folder)?;
-        let radio = Radio::start(Ports::free()?, &keys, Some(&bus))?;
-        Ok(Self { sohle, program, folder, flash, bus, radio, counts, seconds: seconds.into(), long: PathBuf::new() })
-    }
-
-    /// The shoe after its power has come, and the port of its cable.
-    fn shoe(&self, speed: &str) -> Result<(Running, u16), Failure> {
-        let port = free_port()?;
-        let files = [self.counts.as_path(), self.flash.as_path()];
-        let mut running = Running::of(|pace| {
-            let lines = [cable(port, false), line_to(self.radio.ports.hci), pace];
-            emulator(speed, &lines, &files, &self.program)
-        })?;
-        running.pace.wait_until(1)?;
-        Ok((running, port))
-    }
-
-    /// What `sohle` says with these words, and whether it was content.
-    fn sohle(&self, words: &[&str]) -> Result<(bool, String), Failure> {
-        let mut command = Command::new(&self.sohle);
-        self.bus.seen_by(command.args(words));
-        let start = Instant::now();
-        let ended = process::watch(&mut command, || start.elapsed() < LIMIT)?;
-        Ok((ended.code == Some(0), ended.said.out + &ended.said.err))
-    }
-
-    /// Opens the pairing window over the cable, or closes it.
-    fn window(&self, cable: &str, seconds: &str) -> Result<(), Failure> {
-        match self.sohle(&["pair", cable, "--seconds", seconds])? {
-            (true, _) => Ok(()),
-            (false, said) => Err(wrong(format!("sohle pair on the cable said: {said}"))),
-        }
-    }
-
-    /// A `sohle live` that listens, and records the counts of the sensor if a file is named.
-    fn live(&self, address: &str, record: Option<&Path>) -> Result<Live, Failure> {
-        Live::start(&self.sohle, address, |command| {
-            match record {
-                Some(path) => command.arg("--raw").arg("--out").arg(path),
-                None => command.arg("--no-record"),
-            };
-            self.bus.seen_by(command);
-        })
-    }
-
-    /// What was recorded, computed again.
-    fn again(&self, recording: &Path) -> Result<String, Failure> {
-        let mut command = Command::new(&self.sohle);
-        command.args(["replay", "--headless"]).arg(recording).arg("--out").arg(self.folder.join("again"));
-        let again = process::read(&mut command)?;
-        let told = again.out.lines().find(|line| line.contains("bit for bit")).map(str::to_owned);
-        told.ok_or_else(|| wrong(format!("nothing was computed again of {}", recording.display())))
-    }
-
     /// Nobody is let in before the window was opened, and then only who pairs.
     fn strangers_are_refused(&mut self) -> Result<(), Failure> {
         let (_running, cable) = self.shoe(SHIFT)?;
@@ -193,8 +102,8 @@ impl Scene {
         let late = lateness.longest_ms();
         let figures = self.radio.order("figures")?;
         let (wired, wireless) = (wired.finish()?, wireless.finish()?);
-        whole(&wired, "the cable")?;
-        whole(&wireless, "Bluetooth")?;
+        self.whole(&wired, "the cable")?;
+        self.whole(&wireless, "Bluetooth")?;
         let steps = same(&wired, &wireless)?;
         println!("power cut: reconnected with the bond that the flash kept, without pairing");
         println!("cable and Bluetooth at once: {steps} steps on both, the same and once");
@@ -232,7 +141,7 @@ impl Scene {
         running.pace.wait_until(begun + COUNTS_S)?;
         let figures = self.radio.order("figures")?;
         let walk = live.finish()?;
-        whole(&walk, "Bluetooth with counts")?;
+        self.whole(&walk, "Bluetooth with counts")?;
         let (raw, lost) = (walk.summary.raw, walk.summary.raw_lost);
         let share = 100.0 * raw as f64 / (raw + lost).max(1) as f64;
         println!("counts at 2 kHz over the radio: {raw} messages came and {lost} did not, {share:.1} %");
@@ -261,7 +170,7 @@ impl Scene {
         self.radio.order(&format!("garbage-controller {GARBAGE}"))?;
         running.pace.wait_until(begun + self.seconds + LONGER_S)?;
         let walk = live.finish()?;
-        whole(&walk, "the cable under garbage")?;
+        self.whole(&walk, "the cable under garbage")?;
         let times = |sent: &Value| number(sent, "connections");
         println!(
             "a stranger's commands were not carried out; {GARBAGE_ON_AIR} packets of garbage from a stranger over"
@@ -304,8 +213,8 @@ impl Scene {
         self.radio.order("in")?;
         running.pace.wait_until(back_s + 2 * LONGER_S)?;
         let (wired, wireless) = (wired.finish()?, wireless.finish()?);
-        whole(&wired, "the cable")?;
-        whole(&wireless, "Bluetooth after a time out of range")?;
+        self.whole(&wired, "the cable")?;
+        self.whole(&wireless, "Bluetooth after a time out of range")?;
         let steps = same(&wired, &wireless)?;
         let came =
             |from: Instant, to: Instant| wireless.steps.values().filter(|step| (from..to).contains(&step.at)).count();
@@ -351,19 +260,6 @@ fn refused_everything(said: &Value) -> Result<(), Failure> {
         return Ok(());
     }
     Err(wrong(format!("a stranger was not refused: {} (it said {said})", allowed.join(", "))))
-}
-
-/// Steps came, none is missing, none waits, none came twice.
-fn whole(walk: &Walk, where_from: &str) -> Result<(), Failure> {
-    let summary = &walk.summary;
-    let waiting = summary.waiting.unwrap_or(u32::MAX);
-    if summary.lost + summary.doubled + summary.frames_bad + u64::from(waiting) == 0 && !walk.steps.is_empty() {
-        return Ok(());
-    }
-    Err(wrong(format!(
-        "{where_from}: {} steps came, {} were lost, {} came twice, {} frames were bad, {waiting} wait",
-        summary.steps, summary.lost, summary.doubled, summary.frames_bad
-    )))
 }
 
 /// The same steps on both lines, to the last bit, from when both were connected; tells how many.

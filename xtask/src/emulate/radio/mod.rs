@@ -5,6 +5,7 @@ mod check;
 mod figures;
 mod program;
 mod python;
+mod scene;
 
 pub use check::check;
 
