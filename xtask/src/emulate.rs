@@ -146,6 +146,7 @@ pub fn check() -> Result<(), Failure> {
     }
     walks.push(("a simulated walk", simulated(&sohle, &folder, "demo", 1)?, None, SIMULATED_S));
 
+    println!("(delays are right on a machine that does nothing else: on others the emulated clock falls behind)");
     println!("walk                          steps  delay ms, median / longest  load 1/1000  stack");
     for (name, walk, profile, seconds) in &walks {
         let counts = converted(&sohle, &folder, walk, *profile)?;
