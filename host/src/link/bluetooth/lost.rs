@@ -101,13 +101,12 @@ fn walk(air: &Mutex<Air>) -> u32 {
             Some((_, back)) if id >= back => absence = None,
             Some((begun, _)) if id >= begun + UNHEARD => air.connected = None,
             Some(_) => {}
-            None if open && link.connected(Port::Radio) => {
-                if walks && id >= *near.get_or_insert(id) + NEAR {
-                    absence = absences.next().map(|length| (id, id + length));
-                    walks = absence.is_some();
-                    near = None;
-                }
+            None if walks && near.is_some_and(|since| id >= since + NEAR) => {
+                absence = absences.next().map(|length| (id, id + length));
+                walks = absence.is_some();
+                near = None;
             }
+            None if open && link.connected(Port::Radio) => _ = near.get_or_insert(id),
             None => {}
         }
         air.in_range = absence.is_none();
