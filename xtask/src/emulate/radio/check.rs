@@ -30,6 +30,9 @@ const COUNTS_S: u64 = 20;
 const OUT_TENS: u8 = 60;
 /// From being out of range to when both ends have lost the connection: longer than its supervision timeout of 2 s.
 const LOST: Duration = Duration::from_secs(4);
+/// In range again, the laptop is connected within this time, however long it was away, and looked for so often.
+const RETURN: Duration = Duration::from_secs(60);
+const LOOK: Duration = Duration::from_millis(250);
 /// Strides of the walk that is longer than that.
 const LONG_WALK_STRIDES: &str = "640";
 /// Packets of garbage from the controller, from a stranger, whose connection often ends by one, and from the paired laptop.
@@ -211,24 +214,31 @@ impl Scene {
         running.pace.hurry(OUT_TENS)?;
         let (back, back_s) = (Instant::now(), running.pace.seconds()?);
         self.radio.order("in")?;
-        running.pace.wait_until(back_s + 2 * LONGER_S)?;
+        while self.radio.ask("figures")?.get("fault").is_some() {
+            if back.elapsed() > RETURN {
+                return Err(wrong("the laptop is in range again, but does not connect"));
+            }
+            sleep(LOOK);
+        }
+        let connected = back.elapsed().as_secs_f64();
+        let near = running.pace.seconds()? + 2 * LONGER_S;
+        running.pace.wait_until(near)?;
         let (wired, wireless) = (wired.finish()?, wireless.finish()?);
         self.whole(&wired, "the cable")?;
         self.whole(&wireless, "Bluetooth after a time out of range")?;
         let steps = same(&wired, &wireless)?;
-        let came =
-            |from: Instant, to: Instant| wireless.steps.values().filter(|step| (from..to).contains(&step.at)).count();
-        let away = wired.steps.values().filter(|step| (out..back).contains(&step.at)).count();
+        let came = |walk: &Walk| walk.steps.values().filter(|step| (out..back).contains(&step.at)).count();
+        let (away, heard) = (came(&wired), came(&wireless));
         println!(
             "out of range for {} s by the shoe's clock ({:.0} s of the room's) and back: {away} steps were made meanwhile",
             back_s - out_s,
             (back - out).as_secs_f64()
         );
         println!("  and came then, each once and as the cable had it at once; {steps} on both in all");
+        println!("  the laptop was connected {connected:.1} s after it was in range again");
         // A stride takes no longer than 1.2 s.
         let least = usize::from(OUT_TENS) * 10 * 10 / 12;
-        if came(out, back) > 0 || away < least {
-            let heard = came(out, back);
+        if heard > 0 || away < least {
             return Err(wrong(format!(
                 "out of range, {heard} steps came by Bluetooth and {away} of {least} on the cable"
             )));
