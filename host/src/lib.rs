@@ -1,21 +1,11 @@
-//! The laptop's side of Sohle: the wire to the shoe, recordings, simulation, tracks, scores.
+//! The program `sohle`: its commands, the link to the shoe, the window; and by their names what it works with, so that a test
+//! finds all of the laptop's side here.
 
-pub mod building;
-pub mod calibration;
+pub use sohle_map::{alignment, building, fixes, graph, particle, phone};
+pub use sohle_walks::{calibration, evaluation, export, follow, gravity, recording, simulation, toml_file, track};
+
 pub mod cli;
-pub mod evaluation;
-pub mod export;
-pub mod fixes;
-pub mod follow;
-pub mod graph;
-pub mod gravity;
 pub mod link;
-pub mod particle;
-pub mod phone;
-pub mod recording;
 pub mod serve;
-pub mod simulation;
-pub mod toml_file;
-pub mod track;
 #[cfg(feature = "window")]
 pub mod window;

@@ -4,8 +4,8 @@ use super::fixes::{self, Source};
 use super::table::Table;
 use super::{Error, print};
 use crate::building::open::{Options, open};
-use crate::building::picture::{self, Trace};
 use crate::building::{Building, geometry::Point};
+use crate::export::plan::{self, Trace};
 use crate::export::{file, png};
 use crate::fixes::line::Clock;
 use crate::fixes::{Fix, Outliers, smoother};
@@ -273,7 +273,7 @@ fn pictures(building: &Building, places: &[(i32, Point)], folder: &Path) -> Resu
             continue;
         }
         let trace = Trace { label: "on the graph", colour: "#c8322d", width: 2.5, pieces };
-        let drawing = picture::draw_with(building, floor, &[], &[], &[trace]);
+        let drawing = plan::draw_with(building, floor, &[], &[], &[trace]);
         file::write(&folder.join(format!("floor{}.svg", floor.number)), drawing.as_bytes())?;
         file::write(&folder.join(format!("floor{}.png", floor.number)), &png::render(&drawing)?)?;
     }

@@ -3,7 +3,7 @@
 use super::located::Following;
 use super::table::Table;
 use super::{Error, print, progress};
-use crate::evaluation::alignment::{ALIGNED_START_M, Rigid, path_length};
+use crate::alignment::{ALIGNED_START_M, Rigid, path_length};
 use crate::evaluation::matching::Matching;
 use crate::evaluation::score::score;
 use crate::evaluation::truth::Truth;

@@ -2,8 +2,8 @@
 
 use super::{Error, print};
 use crate::building::open::{Options, open};
-use crate::building::picture::{self, Trace};
 use crate::building::{Building, geometry::Point};
+use crate::export::plan::{self, Trace};
 use crate::export::{file, png};
 use crate::graph::draw::{self, draw};
 use crate::graph::route::{Preferences, Route, route};
@@ -89,7 +89,7 @@ fn pictures(building: &Building, graph: &Graph, route: &Route, folder: &Path) ->
             continue;
         }
         let trace = Trace { label: "way", colour: "#2456b4", width: 3.0, pieces };
-        let drawing = picture::draw_with(&plain, floor, &[], &[], &[trace]);
+        let drawing = plan::draw_with(&plain, floor, &[], &[], &[trace]);
         file::write(&folder.join(format!("floor{}.svg", floor.number)), drawing.as_bytes())?;
         file::write(&folder.join(format!("floor{}.png", floor.number)), &png::render(&drawing)?)?;
     }

@@ -3,9 +3,9 @@
 use super::{Input, folder, write_drawing};
 use crate::building::Building;
 use crate::building::check::{Finding, Kind, Level, check, sorted};
-use crate::building::picture::{self, Look, Mark};
 use crate::cli::{Error, print};
 use crate::export::file;
+use crate::export::plan::{self, Look, Mark};
 use crate::graph::lint::{Parameters, lint};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -56,7 +56,7 @@ pub fn run(args: &CheckArgs) -> Result<(), Error> {
         file::folder(&folder)?;
         for floor in &building.floors {
             let marks = marks(&listed, floor.number);
-            write_drawing(&folder, floor.number, &picture::draw(&building, floor, &marks))?;
+            write_drawing(&folder, floor.number, &plan::draw(&building, floor, &marks))?;
         }
         if !args.json {
             print(&format!("marked in {}\n", folder.display()))?;

@@ -2,10 +2,11 @@
 
 use super::check::{counts, marks, refused, shortened, text};
 use super::{Input, folder, write, write_drawing};
-use crate::building::{Building, picture};
+use crate::building::Building;
 use crate::cli::table::Table;
 use crate::cli::{Error, print};
 use crate::export::file;
+use crate::export::plan;
 use crate::graph::draw::{self, draw};
 use crate::graph::lint::{self, lint};
 use crate::graph::{EdgeKind, Graph, adjacency};
@@ -77,7 +78,7 @@ pub fn run(args: &GraphArgs) -> Result<(), Error> {
     let folder = folder(args.out.as_deref(), &args.input.input);
     file::folder(&folder)?;
     for floor in &building.floors {
-        let drawing = picture::draw(&building, floor, &marks(&listed, floor.number));
+        let drawing = plan::draw(&building, floor, &marks(&listed, floor.number));
         write_drawing(&folder, floor.number, &drawing)?;
     }
     print(&format!("walk graph, {from}\n\n{}\n", summary(&building, &graph)))?;

@@ -7,7 +7,8 @@ use super::table::Table;
 use super::{Error, print};
 use crate::building::dxf::Layers;
 use crate::building::open::{self, Format, Options};
-use crate::building::{Building, ConnectorKind, generate, geojson, geometry, picture};
+use crate::building::{Building, ConnectorKind, generate, geojson, geometry};
+use crate::export::plan;
 use crate::export::{file, png};
 use std::path::{Path, PathBuf};
 
@@ -171,7 +172,7 @@ fn show(args: &ShowArgs) -> Result<(), Error> {
     let folder = folder(args.out.as_deref(), &args.input.input);
     file::folder(&folder)?;
     for floor in building.floors.iter().filter(|floor| args.floor.is_none_or(|number| number == floor.number)) {
-        let drawing = picture::draw(&building, floor, &[]);
+        let drawing = plan::draw(&building, floor, &[]);
         write_drawing(&folder, floor.number, &drawing)?;
     }
     print(&format!("{}pictures in {}\n", summary(&building), folder.display()))

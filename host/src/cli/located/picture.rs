@@ -1,6 +1,6 @@
 //! The plan of each floor with the paths on it.
 
-use crate::building::picture::{Dots, Look, Mark, Trace, draw_with};
+use crate::export::plan::{Dots, Look, Mark, Trace, draw_with};
 use crate::follow::{Follower, runs};
 use crate::particle::State;
 

@@ -1,11 +1,11 @@
 //! Pictures of the suites.
 
-use crate::building::picture::{Dots, Trace, draw_with};
 use crate::cli::Error;
 use crate::evaluation::fixes::eight::Comparison;
 use crate::evaluation::graph::eight;
 use crate::evaluation::graph::follow::{Method, Settings};
 use crate::evaluation::phone::walk::PhoneWalk;
+use crate::export::plan::{Dots, Trace, draw_with};
 use crate::export::{file, png};
 use std::path::Path;
 

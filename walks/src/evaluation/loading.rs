@@ -241,7 +241,7 @@ fn strides(
                         .at(time)
                         .ok_or_else(|| table.error(format!("the track has no position at {:.3} s", time.as_seconds())))
                 };
-                super::alignment::distance(at(start)?, at(end)?)
+                crate::alignment::distance(at(start)?, at(end)?)
             }
             (None, None) => return Err(table.error("no lengths")),
         };
@@ -285,8 +285,8 @@ fn within(table: &Table, times: impl Iterator<Item = Micros>, recording: &Record
 
 #[cfg(test)]
 mod tests {
-    use super::super::alignment::path_length;
     use super::*;
+    use crate::alignment::path_length;
     use std::path::Path;
 
     /// The truth of a recording of the project's manifest; `None` where the recordings are absent.

@@ -1,7 +1,7 @@
 //! The beginning of a walk whose start direction nobody gave: steps and positions wait until they show it.
 
 use super::polar::Polar;
-use crate::evaluation::alignment::{Rigid, distance};
+use crate::alignment::{Rigid, distance};
 
 /// What waits.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -167,7 +167,7 @@ impl PhoneTracker {
 
 /// How wrong a step may be (x, y, z, turn) that is so long, with a part of it unsure, and leads so far aside of the one
 /// before; and whether its rise was measured. **Units:** m, rad; **Frame:** heading frame of the previous step.
-pub(crate) fn covariance(p: &Parameters, length: f64, part: f64, turn: f64, measured: bool) -> Matrix4<f64> {
+pub fn covariance(p: &Parameters, length: f64, part: f64, turn: f64, measured: bool) -> Matrix4<f64> {
     let along = (part * length).powi(2) + LEAST_SIGMA_M * LEAST_SIGMA_M;
     let aside = p.aside_m * p.aside_m;
     let tall = if measured { p.barometer.sigma_m } else { UNKNOWN_HEIGHT_M }.powi(2);

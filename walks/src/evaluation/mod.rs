@@ -3,7 +3,6 @@
 //! The default and the document's settings run on the same input; the [`report`] prints both. A manifest is all that is
 //! needed to judge the tracker on other data, see `docs/manifest.md`.
 
-pub mod alignment;
 pub mod building;
 pub mod endurance;
 pub mod fixes;

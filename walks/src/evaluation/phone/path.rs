@@ -1,6 +1,6 @@
 //! A path in time, compared with way-points.
 
-use crate::evaluation::alignment::{Rigid, distance, rigid_rmse};
+use crate::alignment::{Rigid, distance, rigid_rmse};
 use crate::phone::sample::WayPoint;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;

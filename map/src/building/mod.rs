@@ -2,7 +2,7 @@
 //!
 //! A [`Building`] has floors with walls, doors and rooms, and what joins the floors: stairs, ramps, elevators. All formats
 //! become one: [`geojson`] is the project's own, which any GIS shows and edits; each other reader is a file of its own, and [`open`]
-//! recognises which. [`generate`] makes buildings for evaluation, [`route`] finds ways through one, [`picture`] draws it.
+//! recognises which. [`generate`] makes buildings for evaluation, [`route`] finds ways through one.
 //!
 //! # Frame
 //! x east, y north, z up from the origin of the building, in metres. [`Georeference`] tells where that is.
@@ -24,7 +24,6 @@ mod model;
 pub mod open;
 pub mod opening;
 pub mod osm;
-pub mod picture;
 pub mod ros;
 pub mod route;
 #[cfg(test)]

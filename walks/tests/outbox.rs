@@ -1,14 +1,14 @@
 //! A thousand steps fit into the shoe's outbox, whoever walks and however.
 
-use sohle::evaluation::loading::{self, LoadError};
-use sohle::evaluation::manifest::Manifest;
-use sohle::simulation::{Scenario, Simulation};
-use sohle::track::Track;
 use sohle_shared::sample::ImuSample;
 use sohle_shared::tracker::Parameters;
 use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::packed::PackedStep;
 use sohle_shared::wire::port::Port;
+use sohle_walks::evaluation::loading::{self, LoadError};
+use sohle_walks::evaluation::manifest::Manifest;
+use sohle_walks::simulation::{Scenario, Simulation};
+use sohle_walks::track::Track;
 use std::path::Path;
 
 /// As on the boards.

@@ -4,7 +4,7 @@
 //! noise. The way-points themselves are scored.
 
 use super::figures::{Figures, live};
-use crate::evaluation::alignment::Rigid;
+use crate::alignment::Rigid;
 use crate::evaluation::phone::path::Path;
 use crate::evaluation::phone::walk::PhoneWalk;
 use crate::fixes::extended::Extended;

@@ -87,7 +87,7 @@ fn row(walk: &PhoneWalk, phone: &phone::Parameters, particle: &Parameters, seeds
         Path::of(&phone::steps(&walk.samples, &phone::Parameters { length: Length::documented(), ..phone.clone() }));
     Ok(Row {
         walk: walk.name,
-        way_m: crate::evaluation::alignment::path_length(&places),
+        way_m: crate::alignment::path_length(&places),
         steps: steps.len(),
         first_leg_m: laid.and_then(|(path, _)| path.rmse(points)),
         fitted_m: path.fitted_rmse(points),

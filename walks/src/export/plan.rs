@@ -1,9 +1,9 @@
 //! A floor from above, as SVG: rooms, walls, doors, what joins floors, and marks with numbers.
 
-use super::geometry::{self, Outline, Point};
-use super::model::{Building, ConnectorKind, Floor};
-use crate::export::pen::{Anchor, Lettering, Pen};
-use crate::export::scale::{Range, label, round_spacing};
+use super::pen::{Anchor, Lettering, Pen};
+use super::scale::{Range, label, round_spacing};
+use crate::building::geometry::{self, Outline, Point};
+use crate::building::{Building, ConnectorKind, Floor};
 
 /// The page. **Units:** px.
 const WIDTH: f64 = 1400.0;

@@ -8,6 +8,7 @@ pub mod geojson;
 pub mod gpx;
 pub(crate) mod pen;
 pub mod picture;
+pub mod plan;
 pub mod png;
 pub(crate) mod scale;
 pub mod steps_csv;

@@ -1,7 +1,5 @@
 //! A walk with two minutes of standing in it, through driver, twin and shoe: with a sensor that sleeps then, and without.
 
-use sohle::recording::TruthStance;
-use sohle::simulation::{Gait, Leg, Moment, Route, Scenario, Simulation};
 use sohle_shared::bmx055::blocking::{Blocking, block_on};
 use sohle_shared::bmx055::twin::{Chip, SimulatedBmx055, SimulatedDelay, SimulatedDevice};
 use sohle_shared::bmx055::{Batch, Bmx055, Config, Die};
@@ -16,6 +14,8 @@ use sohle_shared::wire::message::{Ack, Action, Command, FromShoe, LaptopHello, S
 use sohle_shared::wire::outbox::{Outbox, Pace};
 use sohle_shared::wire::port::Port;
 use sohle_shared::wire::{PROTOCOL, SCHEMA};
+use sohle_walks::recording::TruthStance;
+use sohle_walks::simulation::{Gait, Leg, Moment, Route, Scenario, Simulation};
 use std::cell::RefCell;
 
 /// **Units:** s.

@@ -1,10 +1,10 @@
 //! Heights where the ground does not lie level: stairs and elevators after a walk on the level.
 #![expect(clippy::unwrap_used, reason = "the helpers of a test are part of it")]
 
-use sohle::simulation::{Scenario, SensorModel, Simulation};
-use sohle::track::Track;
 use sohle_shared::step::FloorMode;
 use sohle_shared::tracker::Parameters;
+use sohle_walks::simulation::{Scenario, SensorModel, Simulation};
+use sohle_walks::track::Track;
 
 /// The steps of the demo, whose way goes over level floors, three flights of stairs and an elevator: what kind of ground,
 /// by how much it really rose, and by how much it was said to. **Units:** m.

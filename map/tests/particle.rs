@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::Rng;
-use sohle::particle::{
+use sohle_map::particle::{
     Connector, ConnectorKind, Map, Parameters, ParticleFilter, Plan, Start, StartPlace, State, Wall,
 };
 use sohle_shared::step::{FloorMode, Step, StepQuality};
@@ -175,7 +175,7 @@ fn the_past_is_better_known_than_it_was() {
     let then = errors(&mut filter, &truth, &steps(&truth, 1));
     let past = filter.past();
     // The steps count from 1, as do the stances after the start.
-    let off = |place: &sohle::particle::PastPlace| {
+    let off = |place: &sohle_map::particle::PastPlace| {
         (nalgebra::Vector3::from(place.position) - truth[place.step as usize].place).xy().norm()
     };
     let first = past[0].step as usize;

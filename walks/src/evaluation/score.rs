@@ -1,9 +1,9 @@
 //! A track against its truth.
 
-use super::alignment::{distance, end_error, path_length, rigid_rmse};
 use super::matching::{Matching, TOLERANCE_US, stance_at};
 use super::metrics::{Metric, Metrics};
 use super::truth::{KnownStride, Reference, Surveyed, Truth};
+use crate::alignment::{distance, end_error, path_length, rigid_rmse};
 use crate::track::{Stance, Track};
 use sohle_shared::time::Micros;
 
