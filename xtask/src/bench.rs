@@ -1,4 +1,4 @@
-//! What the tracker costs on this machine: instructions, counted by callgrind.
+//! What tracker and particle filter cost on this machine: instructions, counted by callgrind.
 //!
 //! Counts, unlike times, are the same on every run and on a busy machine. Callgrind itself is called rather than a bench
 //! framework: one function is switched on and off, and one number is read.
@@ -15,13 +15,57 @@ const PERIODS_US: [u32; 2] = [5_000, 500];
 /// A prediction of the default filter must cost less than this part of a documented one.
 const LARGEST_SHARE: f64 = 0.5;
 
-/// Prints what samples and filter steps cost with both settings. An error when the default filter costs too much.
+/// Buildings for the particle filter: floors, and rooms along each side of them.
+const BUILDINGS: [[u16; 2]; 4] = [[1, 6], [2, 6], [6, 20], [6, 40]];
+const PARTICLES: [u16; 2] = [10_000, 50_000];
+
+/// A particle's step in the largest building must cost less than so many times that in the smallest: the share that is left
+/// for the walls that lie nearer together in a building with more rooms inside.
+const LARGEST_GROWTH: f64 = 1.25;
+
+/// Prints what samples, filter steps and particles cost. An error when the default filter costs too much, and when a particle
+/// costs more in a larger building.
 pub fn run() -> Result<(), Failure> {
     tools::VALGRIND.required()?;
+    tracker()?;
+    particles()
+}
+
+fn particles() -> Result<(), Failure> {
+    let program = process::build("release", "--example", "particle_cost")?;
+    let parts = ["moves", "draw", "clusters", "reference"];
+    println!("instructions for each particle, and the ratio of moves with walls to a textbook's without (x86-64)");
+    let headings = parts.map(|part| format!(" {part:>10}")).concat();
+    println!("  {:>9} {:>6} {:>11}{headings} {:>10}", "particles", "floors", "rooms/floor", "ratio");
+    let mut sums = Vec::new();
+    for count in PARTICLES {
+        for [floors, rooms] in BUILDINGS {
+            let numbers = [count, floors, rooms].map(|number| number.to_string());
+            let cost =
+                |part: &str| self::count(&program, [part].into_iter().chain(numbers.each_ref().map(String::as_str)));
+            let [moves, draw, clusters, reference] = parts.map(cost);
+            let means = [moves?.mean(), draw?.mean(), clusters?.mean(), reference?.mean()];
+            let cells = means.map(|mean| format!(" {mean:>10.1}")).concat();
+            println!("  {count:>9} {floors:>6} {:>11}{cells} {:>10.2}", rooms * rooms, means[0] / means[3]);
+            sums.push(means[0] + means[1] + means[2]);
+        }
+    }
+    let (first, last) = (sums[0], sums[sums.len() - 1]);
+    if last < LARGEST_GROWTH * first {
+        return Ok(());
+    }
+    Err(Failure::Found(format!(
+        "a particle costs {last:.0} instructions in the largest building and {first:.0} in the smallest; at most \
+         {LARGEST_GROWTH} times as many may be"
+    )))
+}
+
+fn tracker() -> Result<(), Failure> {
     let program = process::build("release", "--example", "cost")?;
-    let both = |part: &'static str, period_us| {
-        let default = count(&program, "default", part, period_us)?;
-        Ok::<_, Failure>((part, default, count(&program, "documented", part, period_us)?))
+    let both = |part: &'static str, period_us: u32| {
+        let period = period_us.to_string();
+        let cost = |setting: &str| count(&program, [setting, part, period.as_str()]);
+        Ok::<_, Failure>((part, cost("default")?, cost("documented")?))
     };
     for period_us in PERIODS_US {
         let (swinging, standing) = (both("swinging", period_us)?, both("standing", period_us)?);
@@ -41,10 +85,11 @@ pub fn run() -> Result<(), Failure> {
     )))
 }
 
-fn count(program: &Path, setting: &str, part: &str, period_us: u32) -> Result<Cost, Failure> {
+/// What callgrind counts of a program that prints how often its part ran.
+fn count<'a>(program: &Path, arguments: impl IntoIterator<Item = &'a str>) -> Result<Cost, Failure> {
     let words = "--tool=callgrind --collect-atstart=no --toggle-collect=*counted* --callgrind-out-file=/dev/null";
     let mut command = Command::new("valgrind");
-    command.args(words.split(' ')).arg(program).args([setting, part, &period_us.to_string()]);
+    command.args(words.split(' ')).arg(program).args(arguments);
     let said = process::read(&mut command)?;
     let count = said.out.trim().parse().ok();
     match (count, collected(&said.err)) {
