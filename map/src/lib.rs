@@ -10,3 +10,4 @@ pub mod fixes;
 pub mod graph;
 pub mod particle;
 pub mod phone;
+pub mod sight;

@@ -3,7 +3,7 @@
 //! Everything that the program does with a whole walk and without a shoe, a terminal or a window; tests and fuzzing use it as
 //! the program does.
 
-pub use sohle_map::{alignment, building, fixes, graph, particle, phone};
+pub use sohle_map::{alignment, building, fixes, graph, particle, phone, sight};
 
 pub mod calibration;
 pub mod evaluation;

@@ -5,7 +5,7 @@
 //! though none of them was known at the start.
 //!
 //! [`map`] is the building as the particles see it, [`start`] where they lie at first, [`filter`] the filter itself,
-//! [`estimate`] what it says. Positions of other sources weigh the particles too ([`Sight`]). Both the document's method ([`parameters::Parameters::documented`]) and the default run here.
+//! [`estimate`] what it says. Positions of other sources weigh the particles too ([`crate::sight`]). Both the document's method ([`parameters::Parameters::documented`]) and the default run here.
 //!
 //! # Frame
 //! The building's: x east, y north, z up, in metres; headings counter-clockwise from east.
@@ -41,6 +41,4 @@ pub use filter::ParticleFilter;
 pub use grid::Wall;
 pub use map::{Connector, ConnectorKind, Map, Plan};
 pub use parameters::{Method, Parameters};
-pub(crate) use sight::STANDS_US;
-pub use sight::{Seen, Sight};
 pub use start::{Start, StartPlace};

@@ -1,65 +1,13 @@
-//! What somebody else says of the place: how likely it makes each particle.
-//!
-//! # Source
-//! A mixture of what is right, with its covariance, and of what is anywhere: Thrun, Burgard and Fox, "Probabilistic
-//! robotics", 6.3.
+//! How likely what somebody else says of the place makes each particle.
 
 use super::ancestry::Spot;
 use super::cloud::{BLOCK, Particle};
 use super::motion::Moved;
+use crate::sight::{Seen, Sight};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-/// Somebody of whom no step comes for so long stands. **Units:** us.
-pub(crate) const STANDS_US: i64 = 1_500_000;
-
-/// What was seen of the place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Seen {
-    /// A place and its covariance. **Units:** m, m²; **Frame:** building.
-    Place([f64; 2], Matrix2<f64>),
-    /// The distance to an anchor in space, how much higher that is than the sensor, and the standard deviation. **Units:** m.
-    Range {
-        /// **Frame:** building.
-        anchor: [f64; 2],
-        /// How much higher it is.
-        above_m: f64,
-        /// In space.
-        metres: f64,
-        /// Standard deviation.
-        sigma_m: f64,
-    },
-}
-
-/// A place or a distance that a source tells of.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight {
-    /// What.
-    pub seen: Seen,
-    /// Number of the floor, if the source knows it.
-    pub floor: Option<i32>,
-    /// How likely it has nothing to do with the place, against a particle that fits it exactly: such a sight costs no
-    /// particle more than this. From 1e-9 to 1.
-    pub outlier: f64,
-}
-
 impl Sight {
-    /// [`Self::outlier`], within its bounds.
-    pub(crate) fn odds(&self) -> f64 {
-        if self.outlier.is_finite() { self.outlier.clamp(1e-9, 1.0) } else { 1.0 }
-    }
-
-    /// The same of somebody who may have gone on since (variance of each coordinate). **Units:** m².
-    pub(super) fn within(&self, variance: f64) -> Self {
-        let seen = match self.seen {
-            Seen::Place(place, covariance) => Seen::Place(place, covariance + Matrix2::identity() * variance),
-            Seen::Range { anchor, above_m, metres, sigma_m } => {
-                Seen::Range { anchor, above_m, metres, sigma_m: (sigma_m * sigma_m + variance).sqrt() }
-            }
-        };
-        Self { seen, ..*self }
-    }
-
     /// Weighs the particles by where they are, or by where they were if `spots` tells of each. `floor` is the index of the floor
     /// that the source names.
     pub(super) fn weigh(&self, particles: &mut [Particle], spots: Option<&[Spot]>, floor: Option<usize>) -> Moved {

@@ -1,7 +1,7 @@
 //! A position or a range, as the particle filter takes it.
 
 use crate::fixes::{Measured, Observation, Outliers};
-use crate::particle::{Seen, Sight};
+use crate::sight::{Seen, Sight};
 
 /// The likelihood of an observation for particles.
 pub fn sight(observation: &Observation, outliers: &Outliers) -> Sight {

@@ -6,12 +6,12 @@
 //!
 //! # Source
 //! Fix, 3.2, the extended filter's model of start direction and step scale; the mixture of what is right and what is anywhere as in
-//! [`crate::particle::Sight`].
+//! [`crate::sight::Sight`].
 
 use super::hypothesis::{Hypothesis, Move};
 use super::{Estimate, Matcher};
 use crate::graph::Graph;
-use crate::particle::{STANDS_US, Seen, Sight};
+use crate::sight::{STANDS_US, Seen, Sight};
 use nalgebra::{Matrix2, Matrix2x4, RowVector4, Vector2};
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
@@ -24,8 +24,6 @@ const REMEMBERED: usize = 120;
 const LEAST_FIT: f64 = 0.05;
 /// A sight that fits so little of the probability contradicts what is known.
 const CONTRADICTS: f64 = 0.1;
-/// Somebody is sown within so many standard deviations of a position, and this. **Units:** m.
-const SOWN_WITHIN: (f64, f64) = (2.0, 3.0);
 
 /// A step that was made.
 #[derive(Clone, Copy, Debug)]
@@ -122,13 +120,12 @@ impl<G: Borrow<Graph>> Matcher<G> {
         }
         self.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.weight -= best);
         self.hypotheses.retain(|hypothesis| hypothesis.weight > -self.parameters.given_up);
-        let Seen::Place(place, covariance) = sight.seen else { return 0 };
+        let Some((place, radius)) = sight.around() else { return 0 };
         self.past.contradicted = if right < CONTRADICTS * mass { self.past.contradicted + 1 } else { 0 };
         if self.past.contradicted < self.parameters.contradicted {
             return 0;
         }
         self.past.contradicted = 0;
-        let radius = SOWN_WITHIN.0 * covariance.trace().max(0.0).sqrt() + SOWN_WITHIN.1;
         self.sow_around(place, radius, sight.floor)
     }
 }

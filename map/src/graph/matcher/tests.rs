@@ -2,7 +2,7 @@ use super::*;
 use crate::building::geometry::{Point, distance};
 use crate::building::{Node, WalkGraph};
 use crate::graph::EdgeKind;
-use crate::particle::{Seen, Sight};
+use crate::sight::{Seen, Sight};
 use nalgebra::{Matrix4, Vector3};
 use proptest::prelude::*;
 use sohle_shared::sample::ClippedSamples;

@@ -4,8 +4,8 @@ use super::ParticleFilter;
 use crate::particle::estimate::{Estimate, State};
 use crate::particle::motion::Moved;
 use crate::particle::parameters::Method;
-use crate::particle::sight::{STANDS_US, Seen, Sight};
 use crate::particle::start::Patch;
+use crate::sight::{STANDS_US, Seen, Sight};
 use sohle_shared::time::Micros;
 
 /// Steps whose times are remembered. Nobody's word is later.
@@ -13,10 +13,8 @@ pub(super) const REMEMBERED: usize = 120;
 /// How fast somebody goes, and how far before a step must have been told. **Units:** m/s; m.
 const GOES_M_S: f64 = 1.4;
 const BETWEEN_M: f64 = 0.4;
-/// When so many positions in succession fit nothing that is believed, the person is looked for around the last, within so many
-/// standard deviations and this. **Units:** m.
+/// When so many positions in succession fit nothing that is believed, the person is looked for around the last.
 const CONTRADICTED: usize = 3;
-const SOWN_WITHIN: (f64, f64) = (2.0, 3.0);
 /// Nothing that is older counts where the past of the particles is not remembered. **Units:** s.
 const OLDEST_S: f64 = 5.0;
 
@@ -93,8 +91,7 @@ impl ParticleFilter {
     /// Sows around a place that others tell of, and weighs by it.
     fn search_where_seen(&mut self, sight: &Sight, floor: Option<usize>) -> Moved {
         self.contradicted = 0;
-        if let Seen::Place([x, y], covariance) = sight.seen {
-            let radius = SOWN_WITHIN.0 * covariance.trace().max(0.0).sqrt() + SOWN_WITHIN.1;
+        if let Some(([x, y], radius)) = sight.around() {
             let patch = |floor| Patch { floor, centre: [x as f32, y as f32], radius: radius as f32 };
             let floors = floor.map_or(0..self.map.floors().count(), |floor| floor..floor + 1);
             self.search_in(&floors.map(patch).collect::<Vec<_>>());
