@@ -104,6 +104,16 @@ fn a_recording_of_a_phone_is_replayed_in_a_building() {
     let place = &last["places"][0]["position_m"];
     let [x, y] = [0, 1].map(|axis| place[axis].as_f64().unwrap());
     assert!((x - 76.7).hypot(y - 33.4) < 1.5, "{place}");
+    // What was written of it says the same again, by the settings of a phone.
+    let again = sohle()
+        .current_dir(home.path())
+        .args(["replay", "out/recording.mcap", "--out", "again", "--start", "4,76.7,33.4,-164", "--building"])
+        .arg(folder.join("floorplans/4OG.geojson"))
+        .output()
+        .unwrap();
+    assert!(again.status.success(), "{again:?}");
+    let places = |name: &str| std::fs::read_to_string(home.path().join(name).join("places.jsonl")).unwrap();
+    assert_eq!(places("again"), places("out"));
     let refused = replay(&["--profile", "xio"]);
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8(refused.stderr).unwrap().contains("--profile is for recordings of a shoe"));

@@ -8,16 +8,16 @@ use crate::building::{Building, geometry::Point};
 use crate::export::plan::{self, Trace};
 use crate::export::{file, png};
 use crate::fixes::line::Clock;
-use crate::fixes::{Fix, Outliers, smoother};
+use crate::fixes::{Outliers, smoother};
 use crate::follow::sight;
 use crate::graph::Graph;
 use crate::graph::draw::{self, draw};
 use crate::graph::matcher::{self, Estimate, Matcher};
 use crate::graph::tracker::{Case, Decision, Floors, Parameters, Tracker, start};
 use crate::particle::Start;
+use crate::recording::Recording;
 use crate::track::Track;
 use crate::{follow, particle, phone, recording, toml_file};
-use sohle_shared::step::Step;
 use std::path::{Path, PathBuf};
 
 /// Follows a recorded walk on the walk graph of a building
@@ -92,10 +92,10 @@ pub fn run(args: Args) -> Result<(), Error> {
 
 /// Follows with several hypotheses. Returns floor and place after each step.
 fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, Point)>, Error> {
-    let walk = Walk::read(&args.file, &phone::Parameters::default())?;
+    let walk = read(&args.file, &phone::Parameters::default())?;
     let parameters = match &args.parameters {
         Some(path) => toml_file::read("settings of the matcher", path)?,
-        None if walk.is_phone => matcher::Parameters::phone(),
+        None if walk.is_of_phone() => matcher::Parameters::phone(),
         None => matcher::Parameters::default(),
     };
     let place = |place: particle::StartPlace| matcher::Place {
@@ -112,9 +112,9 @@ fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, 
     if args.barometer {
         matcher = matcher.with_heights();
     }
-    let settings = if walk.is_phone { smoother::Parameters::phone() } else { smoother::Parameters::default() };
+    let settings = if walk.is_of_phone() { smoother::Parameters::phone() } else { smoother::Parameters::default() };
     let said = (args.fixes.as_ref(), &walk.fixes[..]);
-    let mut incoming = fixes::incoming(said, Some(building), walk.clock, &settings, false)?;
+    let mut incoming = fixes::incoming(said, Some(building), Clock::of_past(walk.began_us()), &settings, false)?;
     let (mut places, mut located) = (Vec::new(), None);
     for step in &walk.steps {
         if let Some(incoming) = &mut incoming {
@@ -160,10 +160,11 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
     if args.fixes.is_some() {
         return Err(Error::new("--fixes: the document's tracker takes no positions; expected --method matcher"));
     }
+    let walk = read(&args.file, &phone::Parameters::documented())?;
     let documented = Parameters::documented();
     let parameters = match &args.parameters {
         Some(path) => toml_file::read("settings of the tracker on a graph", path)?,
-        None if phone::open::is_phone(&args.file) => documented,
+        None if walk.is_of_phone() => documented,
         // The foot of a shoe makes every other step, which is measured.
         None => Parameters { step_m: 0.0, ..documented },
     };
@@ -189,7 +190,7 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
         tracker = tracker.with_barometer(floors);
     }
     let mut decisions = Vec::new();
-    for step in &Walk::read(&args.file, &phone::Parameters::documented())?.steps {
+    for step in &walk.steps {
         let rise = f64::from(step.displacement.z);
         let decision = tracker.step(f64::from(step.turn), f64::from(step.length()), rise);
         if args.explain {
@@ -202,29 +203,17 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
     Ok(decisions.iter().map(|decision| (floor_of(decision), decision.place)).collect())
 }
 
-/// A recorded walk.
-struct Walk {
-    is_phone: bool,
-    steps: Vec<Step>,
-    /// Positions of other sources that the recording brings along.
-    fixes: Vec<Fix>,
-    /// What the times of the steps count from.
-    clock: Clock,
-}
-
-impl Walk {
-    fn read(file: &Path, phone: &phone::Parameters) -> Result<Self, Error> {
-        if phone::open::is_phone(file) {
-            let steps = phone::steps(&phone::open::open(file)?.samples, phone);
-            // The clock of a phone counts from 1970.
-            return Ok(Self { is_phone: true, steps, fixes: Vec::new(), clock: Clock::of_past(Some(0)) });
-        }
-        let recording = recording::open(file, None)?;
-        let track = Track::of(recording.samples.iter().copied(), &sohle_shared::tracker::Parameters::default());
-        let clock = Clock::of_past(recording.began_us());
-        let steps = if recording.samples.is_empty() { recording.steps } else { track.steps };
-        Ok(Self { is_phone: false, steps, fixes: recording.fixes, clock })
+/// A recorded walk with its steps.
+fn read(file: &Path, phone: &phone::Parameters) -> Result<Recording, Error> {
+    if phone::open::is_phone(file) {
+        return Ok(Recording::of_phone(file, phone)?);
     }
+    let mut recording = recording::open(file, None)?;
+    if !recording.samples.is_empty() {
+        let samples = recording.samples.iter().copied();
+        recording.steps = Track::of(samples, &sohle_shared::tracker::Parameters::default()).steps;
+    }
+    Ok(recording)
 }
 
 /// How often each case was decided, and where the walk ends.

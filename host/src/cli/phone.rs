@@ -2,6 +2,7 @@
 
 use super::fixes::Source;
 use super::located::{Following, building, finish_and_tell};
+use super::report::RECORDING;
 use super::table::Table;
 use super::{Error, Output, fixes, print};
 use crate::export::picture::{Line, Picture, Placement, Role};
@@ -9,7 +10,8 @@ use crate::export::{self, Named};
 use crate::fixes::Fix;
 use crate::fixes::line::Clock;
 use crate::fixes::smoother;
-use crate::phone::{self, Parameters};
+use crate::phone::Parameters;
+use crate::recording::{Recording, mcap};
 use crate::track::Track;
 use std::path::Path;
 
@@ -34,22 +36,20 @@ pub struct Replay<'a> {
 impl Replay<'_> {
     /// Reads, finds the steps, tells and writes. The positions of other sources that were heard, if there were some.
     pub fn run(self) -> Result<Option<Vec<Fix>>, Error> {
-        let recording = phone::open::open(self.file)?;
         let mut settings = vec![(Role::Chosen, "default", self.parameters)];
         if self.compare {
             settings.push((Role::Documented, "documented", Parameters::documented()));
         }
-        let tracks: Vec<Track> = settings
-            .iter()
-            .map(|(_, _, parameters)| Track::of_steps(&phone::steps(&recording.samples, parameters)))
-            .collect();
+        let walks = settings.iter().map(|(_, _, parameters)| Recording::of_phone(self.file, parameters));
+        let walks: Vec<Recording> = walks.collect::<Result<_, _>>()?;
+        let tracks: Vec<Track> = walks.iter().map(|walk| Track::of_steps(&walk.steps)).collect();
         let texts = settings.iter().map(|(_, _, parameters)| toml::to_string(parameters));
         let texts: Vec<String> = texts.collect::<Result<_, _>>()?;
         let name = self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let folder = self.output.folder(&name);
         let mut table = Table::new("settings", &["steps", "distance, m"]);
         let mut picture = Picture::new(name);
-        picture.note = format!("{} samples of a phone; steps counted, their length estimated", recording.samples.len());
+        picture.note = "steps of a phone, counted, their length estimated".into();
         picture.columns = table.headings().to_vec();
         let named: Vec<Named<'_>> = settings
             .iter()
@@ -64,26 +64,33 @@ impl Replay<'_> {
             picture.lines.push(Line::of(named, cells.clone()));
             table.row(named.label, cells);
         }
-        let files = export::write_all(&folder, &picture, &named, self.output.origin)?;
+        let mut files = export::write_all(&folder, &picture, &named, self.output.origin)?;
         if !self.quiet {
             print(&format!("{}\n{}\n\n{}\n", picture.title, picture.note, table.text()))?;
-            print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;
         }
-        let Some(track) = tracks.first() else { return Ok(None) };
-        // The clock of a phone counts from 1970.
-        let (clock, settings) = (Clock::of_past(Some(0)), smoother::Parameters::phone());
-        let incoming =
+        let Some(mut walk) = walks.into_iter().next() else { return Ok(None) };
+        let (clock, settings) = (Clock::of_past(walk.began_us()), smoother::Parameters::phone());
+        let mut incoming =
             fixes::incoming((self.fixes, &[]), building(self.following.as_ref()), clock, &settings, self.quiet)?;
         let heard = incoming.as_ref().map(|incoming| incoming.fixes().to_vec());
-        let Some(mut following) = self.following else {
-            fixes::alone(incoming, &track.steps, &folder, self.quiet)?;
-            return Ok(heard);
-        };
-        following.hearing(incoming);
-        for step in &track.steps {
-            following.step(step, None);
+        walk.fixes = heard.clone().unwrap_or_default();
+        let mut following = self.following;
+        if let Some(following) = &mut following {
+            following.hearing(incoming.take());
+            for step in &walk.steps {
+                following.step(step, walk.began_us().map(|began| began + step.stance_end.0));
+            }
         }
-        finish_and_tell(following, None, &folder, self.quiet)?;
+        let (building, moments) = following.as_ref().map(Following::shown).unwrap_or_default();
+        mcap::write_shown(&folder.join(RECORDING), &walk, &building, moments)?;
+        files.push(RECORDING.to_owned());
+        if !self.quiet {
+            print(&format!("Written to {}: {}\n", folder.display(), files.join(", ")))?;
+        }
+        if let Some(following) = following {
+            finish_and_tell(following, None, &folder, self.quiet)?;
+        }
+        fixes::alone(incoming, &walk.steps, &folder, self.quiet)?;
         Ok(heard)
     }
 }

@@ -77,7 +77,6 @@ pub fn run(args: Args) -> Result<(), Error> {
         }
         return Ok(());
     }
-    let mut following = place.prepare(particle::Parameters::default())?.map(Following::keeping_all);
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut settings = vec![match &parameters {
         Some(path) => Settings { label: stem(path), parameters: parameters::read(path)?, ..Settings::default() },
@@ -89,6 +88,12 @@ pub fn run(args: Args) -> Result<(), Error> {
     let calibration = calibration.as_deref().map(calibration::read).transpose()?;
     let profile = profile.map(|text| Profile::parse(&text)).transpose()?;
     let mut recording = recording::open(&file, profile.as_ref())?;
+    let (particle, positions) = if recording.is_of_phone() {
+        (particle::Parameters::phone(), smoother::Parameters::phone())
+    } else {
+        Default::default()
+    };
+    let mut following = place.prepare(particle)?.map(Following::keeping_all);
     let again = recording.again;
     if let Some(again) = &again
         && !quiet
@@ -98,7 +103,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let folder = output.folder(&stem(&file));
     let clock = Clock::of_past(recording.began_us());
     let said = (fixes.as_ref(), &recording.fixes[..]);
-    let mut incoming = incoming(said, building(following.as_ref()), clock, &smoother::Parameters::default(), quiet)?;
+    let mut incoming = incoming(said, building(following.as_ref()), clock, &positions, quiet)?;
     if let Some(incoming) = incoming.as_ref().filter(|_| fixes.is_some()) {
         recording.fixes = incoming.fixes().to_vec();
     }

@@ -18,6 +18,7 @@ pub mod mapping;
 pub mod mat;
 pub mod mcap;
 mod message;
+mod of_phone;
 mod openshoe;
 mod plain;
 pub mod profile;

@@ -160,16 +160,16 @@ impl Opening {
     fn replay(&self, path: &Path, building: Option<Building>) -> Result<Box<dyn super::Source>, Error> {
         let mut settings = self.settings.clone();
         let mut recording = if phone::open::is_phone(path) {
+            Recording { name: self.name(), ..Recording::of_phone(path, &self.phone)? }
+        } else {
+            recording::open(path, self.profile.as_ref())?
+        };
+        if recording.is_of_phone() {
             if settings.follow.particle == particle::Parameters::default() {
                 settings.follow.particle = particle::Parameters::phone();
             }
             settings.positions = smoother::Parameters::phone();
-            let samples = phone::open::open(path)?.samples;
-            let steps = phone::steps(&samples, &self.phone);
-            Recording { name: self.name(), steps, ..Recording::default() }
-        } else {
-            recording::open(path, self.profile.as_ref())?
-        };
+        }
         if recording.samples.is_empty() && recording.steps.is_empty() {
             return Err(Error::Empty(self.name()));
         }
@@ -189,9 +189,7 @@ fn read(
     building: Option<&Building>,
     settings: &Settings,
 ) -> Result<Vec<Fix>, Error> {
-    // The clock of a phone counts from 1970.
-    let phone = recording.samples.is_empty().then_some(0);
     let mut incoming = Incoming::new(building, &settings.positions, false).map_err(Error::positions)?;
-    incoming.read(source, Clock::of_past(recording.began_us().or(phone))).map_err(Error::positions)?;
+    incoming.read(source, Clock::of_past(recording.began_us())).map_err(Error::positions)?;
     Ok(incoming.fixes().to_vec())
 }
