@@ -15,13 +15,14 @@ const PERIODS_US: [u32; 2] = [5_000, 500];
 /// A prediction of the default filter must cost less than this part of a documented one.
 const LARGEST_SHARE: f64 = 0.5;
 
-/// Buildings for the particle filter: floors, and rooms along each side of them.
-const BUILDINGS: [[u16; 2]; 4] = [[1, 6], [2, 6], [6, 20], [6, 40]];
-const PARTICLES: [u16; 2] = [10_000, 50_000];
+/// Buildings for the particle filter, each with clouds of so many particles: floors, and rooms along each side of them. The
+/// largest has six floors of 10 000 m².
+const BUILDINGS: [([u16; 2], &[u16]); 3] =
+    [([1, 6], &[10_000, 50_000]), ([2, 6], &[10_000]), ([6, 20], &[10_000, 50_000])];
 
-/// A particle's step in the largest building must cost less than so many times that in the smallest: the share that is left
-/// for the walls that lie nearer together in a building with more rooms inside.
-const LARGEST_GROWTH: f64 = 1.25;
+/// To move and to draw a particle in the largest building must cost less than so many times that in the smallest. What a cluster
+/// costs depends on how many cells the cloud occupies, at most one for each particle, and so on the cloud.
+const LARGEST_GROWTH: f64 = 1.05;
 
 /// Prints what samples, filter steps and particles cost. An error when the default filter costs too much, and when a particle
 /// costs more in a larger building.
@@ -33,21 +34,29 @@ pub fn run() -> Result<(), Failure> {
 
 fn particles() -> Result<(), Failure> {
     let program = process::build("release", "--example", "particle_cost")?;
-    let parts = ["moves", "draw", "clusters", "reference"];
-    println!("instructions for each particle, and the ratio of moves with walls to a textbook's without (x86-64)");
-    let headings = parts.map(|part| format!(" {part:>10}")).concat();
-    println!("  {:>9} {:>6} {:>11}{headings} {:>10}", "particles", "floors", "rooms/floor", "ratio");
+    let cost = |part: &str, numbers: [u16; 3]| {
+        let numbers = numbers.map(|number| number.to_string());
+        let words = [part].into_iter().chain(numbers.each_ref().map(String::as_str));
+        Ok::<_, Failure>(count(&program, words)?.mean())
+    };
+    let reference = cost("reference", [10_000, 1, 6])?;
+    println!(
+        "instructions for each particle, and the ratio of moves with walls to a textbook's without, {reference:.0} (x86-64)"
+    );
+    println!("  floors  rooms/floor  particles      moves       draw   clusters      ratio");
     let mut sums = Vec::new();
-    for count in PARTICLES {
-        for [floors, rooms] in BUILDINGS {
-            let numbers = [count, floors, rooms].map(|number| number.to_string());
-            let cost =
-                |part: &str| self::count(&program, [part].into_iter().chain(numbers.each_ref().map(String::as_str)));
-            let [moves, draw, clusters, reference] = parts.map(cost);
-            let means = [moves?.mean(), draw?.mean(), clusters?.mean(), reference?.mean()];
-            let cells = means.map(|mean| format!(" {mean:>10.1}")).concat();
-            println!("  {count:>9} {floors:>6} {:>11}{cells} {:>10.2}", rooms * rooms, means[0] / means[3]);
-            sums.push(means[0] + means[1] + means[2]);
+    for ([floors, rooms], clouds) in BUILDINGS {
+        for &particles in clouds {
+            let [moves, draw, clusters] =
+                ["moves", "draw", "clusters"].map(|part| cost(part, [particles, floors, rooms]));
+            let (moves, draw) = (moves?, draw?);
+            let ratio = moves / reference;
+            let rooms = u32::from(rooms).pow(2);
+            println!(
+                "  {floors:>6} {rooms:>12} {particles:>10} {moves:>10.1} {draw:>10.1} {:>10.1} {ratio:>10.2}",
+                clusters?
+            );
+            sums.push(moves + draw);
         }
     }
     let (first, last) = (sums[0], sums[sums.len() - 1]);
