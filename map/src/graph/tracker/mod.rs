@@ -56,7 +56,7 @@ pub struct Tracker<'a> {
     /// Where the last turn was made, and the edges since.
     turned_at: NodeId,
     trail: Vec<EdgeId>,
-    /// Where the last search began, and how many edges ago that was.
+    /// Where the steps lead to from where the last search began, and how many edges ago that was.
     searched: Option<(crate::building::geometry::Point, usize)>,
     variance: Variance,
     /// What the barometer tells, if there is one.
@@ -100,6 +100,10 @@ impl<'a> Tracker<'a> {
         let before = self.delta;
         self.delta = wrapped(before + turn);
         let length_m = self.length(measured_m);
+        let heading = self.heading();
+        if let Some((from, _)) = &mut self.searched {
+            *from = [from[0] + length_m * heading.cos(), from[1] + length_m * heading.sin()];
+        }
         let mut decision = Decision {
             case: Case::Waiting,
             delta: self.delta,

@@ -60,14 +60,16 @@ impl Tracker<'_> {
         self.searched = Some((from, 0));
     }
 
-    /// Where the steps that are held back lead to, from the last position; from where the last search began if that was
-    /// a few edges ago: it found the wrong edge.
+    /// Where the steps that are held back lead to, from the last position. From where the last search began, over all steps
+    /// since, if that was a few edges ago: it found the wrong edge. The document adds "the new search steps"; those in between
+    /// were walked, too.
     fn search_from(&self) -> Point {
-        let start = match self.searched {
-            Some((from, edges)) if edges <= self.parameters.again_edges => from,
-            _ => self.graph.on(self.edge, self.along_m),
-        };
-        self.held.iter().fold(start, |[x, y], held| {
+        if let Some((from, edges)) = self.searched
+            && edges <= self.parameters.again_edges
+        {
+            return from;
+        }
+        self.held.iter().fold(self.graph.on(self.edge, self.along_m), |[x, y], held| {
             [x + held.length_m * held.heading.cos(), y + held.length_m * held.heading.sin()]
         })
     }

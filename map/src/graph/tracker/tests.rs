@@ -267,6 +267,16 @@ fn case_5_decision_x_a_second_search_goes_on_from_where_the_first_began() {
     assert_eq!(walk(&mut tracker, &[0.0]).window, 7);
 }
 
+#[test]
+fn case_5_decision_x_the_steps_between_two_searches_count() {
+    let graph = search_graph(3.0);
+    let mut tracker = tracker(&graph);
+    walk(&mut tracker, &NORTH_AFTER_THREE);
+    let decision = walk(&mut tracker, &[0.0, 90.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let search = decision.search.unwrap();
+    assert!(distance(search.from, [3.0 * STEP - 6.0 * STEP, 7.0 * STEP]) < 1e-9, "{decision}");
+}
+
 /// Two floors, 3.6 m apart, with stairs in two flights from node 1 to node 4 and an elevator from node 6 to node 7.
 fn two_floors() -> (Graph, Floors) {
     let node = |floor: i32, place: Point, height_m: f64| Node { floor, place, height_m };
