@@ -14,6 +14,16 @@ pub struct Flight {
     pub between: Vec<[f64; 3]>,
 }
 
+impl Flight {
+    /// The direction in which one leaves it at an end; none in an elevator. **Units:** rad; **Frame:** building.
+    pub fn direction(&self, end: usize) -> Option<f64> {
+        let next = if end == 0 { self.between.first() } else { self.between.last() };
+        let from = next.map_or(self.landings[1 - end], |&[x, y, _]| [x, y]);
+        let to = self.landings[end];
+        (geometry::distance(from, to) > 0.1).then(|| (to[1] - from[1]).atan2(to[0] - from[0]))
+    }
+}
+
 /// From the short end of the outline of stairs without a way to where one steps on them, as a part of their length.
 const IN_PART: f64 = 0.2;
 /// Points of a way that lie nearer than this to the line through their neighbours are left out. **Units:** m.

@@ -12,6 +12,8 @@ const MOST_CELLS: f64 = 4e6;
 const GATE_M: (f64, f64) = (1.2, 0.3);
 /// From a door people go straight on so far, if the middle of what is behind it is not nearer. **Units:** m.
 pub const STRAIGHT_ON_M: f64 = 2.5;
+/// And from a landing. **Units:** m.
+const LANDING_M: f64 = 3.5;
 /// Bins for the directions of walls, of a quarter turn.
 const DIRECTIONS: usize = 90;
 
@@ -184,7 +186,7 @@ impl Free {
     }
 
     /// Visits the cells whose middle is within `reach` of a line. **Frame:** building; **Units:** m.
-    fn near(&self, line: &Segment, reach: f64, mut visit: impl FnMut(usize)) {
+    pub fn near(&self, line: &Segment, reach: f64, mut visit: impl FnMut(usize)) {
         let line = line.map(|point| self.to_cells(point));
         for piece in pieces(&line, 2.0) {
             let range = |axis: usize, count: usize| {
@@ -263,6 +265,20 @@ impl Free {
             self.straight_on.extend(line);
         }
         true
+    }
+
+    /// From a landing people go straight on to the middle of what is before it, too. **Units:** rad; **Frame:** building.
+    pub fn go_straight_on(&mut self, place: Point, direction: f64) {
+        let (sin, cos) = direction.sin_cos();
+        let at = |step: usize| {
+            let far = step as f64 * 0.5 * self.side;
+            self.cell([place[0] + far * cos, place[1] + far * sin]).filter(|&cell| self.free[cell])
+        };
+        let line: Vec<usize> = (0..(LANDING_M / (0.5 * self.side)) as usize).map_while(at).collect();
+        let wide = |cell: usize| self.clearance[cell];
+        // The first of the widest places.
+        let Some(end) = (0..line.len()).rev().max_by(|&a, &b| wide(line[a]).total_cmp(&wide(line[b]))) else { return };
+        self.straight_on.extend(&line[..=end]);
     }
 
     /// Distance of each cell from the nearest of some. **Units:** m.

@@ -1,13 +1,16 @@
 //! Draws the walk graph of a building from its walls, doors, stairs and elevators, as the graph document draws it by hand.
 //!
 //! The free places of each floor are thinned to lines along their middle, which lead through every door into every room.
-//! The lines become nodes and edges of about the length that the document found best; crossings are modelled for those
-//! who cut the corner, halls get a net of nodes. Stairs and elevators join the floors.
+//! The lines become nodes and edges of about the length that the document found best, straight wherever people go straight on:
+//! to a tracker that begins its heading anew on each edge a bend is a turn. Crossings are modelled for those who cut the
+//! corner, halls are crossed or get a net of nodes. Stairs and elevators join the floors.
 //!
 //! # Source
 //! Graph, 6.2.2 and 7.1, for what a good graph is.
 
+mod arms;
 mod climb;
+mod corridor;
 mod free;
 mod open;
 mod sketch;
@@ -36,9 +39,12 @@ pub struct Parameters {
     pub fork_deg: f64,
     /// Nobody walks nearer to a wall. **Units:** m.
     pub clear_m: f64,
-    /// An area where a disc of this radius has room is open: it gets a net of nodes. **Units:** m.
+    /// An area where a disc of this radius has room is open: it is crossed straight from each way that leads into it to each
+    /// other. **Units:** m.
     pub open_m: f64,
-    /// No free place is farther from the graph. **Units:** m.
+    /// One where a disc of this radius has room gets a net of nodes. **Units:** m.
+    pub net_m: f64,
+    /// No free place is farther from the graph, but in halls that are crossed. **Units:** m.
     pub reach_m: f64,
     /// A corner is cut between places so far from it, from the nearest to the farthest. **Units:** m.
     pub cut_m: [f64; 2],
@@ -53,9 +59,10 @@ impl Default for Parameters {
             shortest_m: 0.9,
             fork_deg: 20.0,
             clear_m: 0.2,
-            open_m: 2.3,
+            open_m: 3.5,
+            net_m: 6.5,
             reach_m: 4.0,
-            cut_m: [1.2, 1.7],
+            cut_m: [0.8, 1.7],
             cell_m: 0.1,
         }
     }
@@ -73,6 +80,7 @@ impl Parameters {
             ("fork_deg", self.fork_deg, 0.0, 45.0),
             ("clear_m", self.clear_m, 0.05, 1.0),
             ("open_m", self.open_m, 0.5, 100.0),
+            ("net_m", self.net_m, self.open_m, 100.0),
             ("reach_m", self.reach_m, 1.0, 1_000.0),
             ("cut_m[0]", self.cut_m[0], 0.3, 20.0),
             ("cut_m[1]", self.cut_m[1], self.cut_m[0], 20.0),
@@ -93,6 +101,10 @@ const LONGEST: f64 = 1.4;
 const STRAIGHT_M: f64 = 0.15;
 /// Lines that miss each other by less are laid on one. **Units:** m.
 const ALIGNED_M: f64 = 0.25;
+/// A corridor is laid straight past openings if its nodes are no farther from its line. **Units:** m.
+const CORRIDOR_M: f64 = 0.7;
+/// A way without any other is pulled straight if it is no farther from that. **Units:** m.
+const PULLED_M: f64 = 0.8;
 /// A landing, an entrance or the middle of a room may be so far from the next free place. **Units:** m.
 const STAND_M: f64 = 1.2;
 /// A room is a corridor, which needs no node in its middle, from so many times longer than wide on.
@@ -177,8 +189,9 @@ fn draw_floor(
     flights: &[Flight],
     parameters: &Parameters,
 ) -> (Sketch, BTreeMap<(usize, usize), usize>) {
-    let free = Free::of(building, floor, parameters.clear_m, parameters.cell_m);
+    let mut free = Free::of(building, floor, parameters.clear_m, parameters.cell_m);
     let open = open::open_cells(&free, parameters.open_m);
+    let net = open::open_cells(&free, parameters.net_m);
     let mut held: BTreeMap<usize, Hold> = free.gates.iter().map(|&cell| (cell, Hold::Place)).collect();
     let mut landings = BTreeMap::new();
     for (index, flight) in flights.iter().enumerate() {
@@ -186,12 +199,15 @@ fn draw_floor(
             if let Some(cell) = free.nearest(flight.landings[end], STAND_M) {
                 held.insert(cell, Hold::Fixed);
                 landings.insert((index, end), cell);
+                if let Some(direction) = flight.direction(end) {
+                    free.go_straight_on(flight.landings[end], direction);
+                }
             }
         }
     }
     let entrances = building.entrances.iter().filter(|entrance| entrance.floor == floor.number);
     let stands = entrances.filter_map(|entrance| free.nearest(entrance.place, STAND_M));
-    let rooms = floor.rooms.iter().filter_map(|room| middle_of(&free, &open, &room.outline));
+    let rooms = floor.rooms.iter().filter_map(|room| middle_of(&free, &net, &room.outline));
     for cell in stands.chain(rooms).collect::<Vec<_>>() {
         held.insert(cell, Hold::Fixed);
     }
@@ -211,23 +227,28 @@ fn draw_floor(
     let mut sketch = traced.sketch;
     let fork = parameters.fork_deg.to_radians();
     sketch.prune(free::STRAIGHT_ON_M);
-    sketch.straighten(&free, STRAIGHT_M);
+    sketch.straighten(&free, STRAIGHT_M, Hold::Loose);
     sketch.contract(&free, parameters.shortest_m);
     sketch.align(&free, ALIGNED_M);
-    sketch.straighten(&free, STRAIGHT_M);
+    corridor::straighten(&free, &mut sketch, CORRIDOR_M);
+    sketch.straighten(&free, STRAIGHT_M, Hold::Loose);
+    sketch.contract(&free, parameters.shortest_m);
+    arms::straight_through_doors(&free, &mut sketch);
+    sketch.pull(&free, PULLED_M);
+    sketch.straighten(&free, STRAIGHT_M, Hold::Place);
     sketch.contract(&free, parameters.shortest_m);
     sketch.split(parameters.edge_m, LONGEST * parameters.edge_m);
-    sketch.diagonals(&free, fork, parameters.cut_m);
-    open::net(&free, &mut sketch, &open, parameters.edge_m, fork);
+    let nets = open::cross(&free, &mut sketch, [&open, &net], parameters.edge_m, fork);
+    sketch.diagonals(&free, fork, parameters.cut_m, &nets);
     let nodes = landings.into_iter().filter_map(|(landing, cell)| Some((landing, *traced.node_of.get(&cell)?)));
     let nodes = nodes.collect();
     (sketch, nodes)
 }
 
 /// Where one stands in the middle of a room; nothing in a corridor and in a hall, which get nodes anyway.
-fn middle_of(free: &Free, open: &[bool], outline: &[Point]) -> Option<usize> {
+fn middle_of(free: &Free, net: &[bool], outline: &[Point]) -> Option<usize> {
     let cells: Vec<usize> = free.cells_in(outline).into_iter().filter(|&cell| free.free[cell]).collect();
-    if cells.iter().any(|&cell| open[cell]) {
+    if cells.iter().any(|&cell| net[cell]) {
         return None;
     }
     let widest = cells.iter().map(|&cell| free.clearance[cell]).fold(0.0, f32::max);

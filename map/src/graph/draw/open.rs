@@ -1,9 +1,12 @@
-//! Open areas: halls where one may walk anywhere get a net of nodes instead of a line along their middle.
+//! Open areas: halls where one may walk anywhere are crossed straight from way to way instead of along their middle, and get a
+//! net of nodes where they are too large for that.
 
+use super::LONGEST;
 use super::free::Free;
 use super::sketch::{Hold, Sketch};
 use crate::building::geometry::{self, Point};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
 
 /// The cells within `radius` of a place that is so far from every wall: where a disc of this size has room. **Units:** m.
 pub fn open_cells(free: &Free, radius: f64) -> Vec<bool> {
@@ -15,13 +18,14 @@ pub fn open_cells(free: &Free, radius: f64) -> Vec<bool> {
     (0..free.count()).map(|cell| free.free[cell] && f64::from(near[cell]) <= reach).collect()
 }
 
-/// Puts a net of nodes about `edge_m` apart on the open cells, joined with their eight neighbours, and joins the ports to
-/// it. Two edges that leave a node are `fork` apart. **Units:** m, rad.
-pub fn net(free: &Free, sketch: &mut Sketch, open: &[bool], edge_m: f64, fork: f64) {
+/// Crosses the open cells: by straight lines between the ports of an area, or by a net of nodes where one of its cells is for a
+/// `net` or some ports do not see each other. Edges are about `edge_m` long, and two that leave a node are `fork` apart.
+/// Returns the nodes of the nets. **Units:** m, rad.
+pub fn cross(free: &Free, sketch: &mut Sketch, [open, net]: [&[bool]; 2], edge_m: f64, fork: f64) -> BTreeSet<usize> {
     let ports: Vec<usize> =
         (0..sketch.dots.len()).filter(|&dot| sketch.dots[dot].port && !sketch.dots[dot].gone).collect();
     let mut seen = vec![false; open.len()];
-    let mut nodes = Vec::new();
+    let (mut nodes, mut crossed) = (Vec::new(), BTreeSet::new());
     for start in 0..open.len() {
         if !open[start] || std::mem::replace(&mut seen[start], true) {
             continue;
@@ -36,16 +40,117 @@ pub fn net(free: &Free, sketch: &mut Sketch, open: &[bool], edge_m: f64, fork: f
             }
             next += 1;
         }
-        let lines = ahead(free, sketch, &ports);
+        let small = !cells.iter().any(|&cell| net[cell]);
+        if let Some(joined) = small.then(|| star(free, sketch, &cells, &ports, edge_m, fork)).flatten() {
+            crossed.extend(joined);
+            continue;
+        }
+        let lines = rows_of(free, sketch, &ports);
         nodes.extend(lattice(free, sketch, open, &cells, &lines, edge_m));
     }
     for port in ports {
-        join_port(free, sketch, port, &nodes, edge_m, fork);
+        join_port(free, sketch, port, &nodes, [edge_m, fork], crossed.contains(&port));
     }
+    nodes.into_iter().collect()
+}
+
+/// Joins the ports of one open area, the nearest first, by edges of about `edge_m`, if each sees each other; if not, nothing is
+/// done. Returns them. A line that would leave a node nearly along another is left out unless it joins what is apart.
+fn star(
+    free: &Free,
+    sketch: &mut Sketch,
+    cells: &[usize],
+    ports: &[usize],
+    edge_m: f64,
+    fork: f64,
+) -> Option<Vec<usize>> {
+    let cells: BTreeSet<usize> = cells.iter().copied().collect();
+    // One beside a door between two areas belongs to both.
+    let is_here = |&port: &usize| {
+        let (place, mut is) = (sketch.dots[port].place, false);
+        free.near(&[place; 2], BESIDE_M, |cell| is |= cells.contains(&cell) && free.sees(place, free.place(cell)));
+        is
+    };
+    let here: Vec<usize> = ports.iter().copied().filter(is_here).collect();
+    let heads: Vec<(usize, Point)> = here.iter().map(|&port| (port, ahead_of(free, sketch, port))).collect();
+    let mut pairs: Vec<(f64, [usize; 2])> = Vec::new();
+    for (first, (_, a)) in heads.iter().enumerate() {
+        for (second, (_, b)) in heads.iter().enumerate().skip(first + 1) {
+            if free.sees(*a, *b) {
+                pairs.push((geometry::distance(*a, *b), [first, second]));
+            }
+        }
+    }
+    if 2 * pairs.len() < heads.len() * heads.len().saturating_sub(1) {
+        return None;
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let nodes: Vec<usize> = heads
+        .iter()
+        .map(|&(port, place)| {
+            if place == sketch.dots[port].place {
+                return port;
+            }
+            let node = sketch.add(place, Hold::Loose);
+            sketch.join(port, node);
+            node
+        })
+        .collect();
+    let mut piece: Vec<usize> = (0..nodes.len()).collect();
+    let mut lines = Vec::new();
+    for (_, [first, second]) in pairs {
+        let [a, b] = [nodes[first], nodes[second]];
+        let forks = sketch.forks(a, sketch.dots[b].place, fork) || sketch.forks(b, sketch.dots[a].place, fork);
+        let (from, to) = (piece[first], piece[second]);
+        if !forks || from != to {
+            piece.iter_mut().filter(|piece| **piece == to).for_each(|piece| *piece = from);
+            sketch.join(a, b);
+            lines.push([a, b]);
+        }
+    }
+    for [a, b] in lines {
+        sketch.split_edge(a, b, edge_m, LONGEST * edge_m);
+    }
+    Some(here)
+}
+
+/// A port lies so far beside its area at most. **Units:** m.
+const BESIDE_M: f64 = 1.2;
+/// Out of a door one goes straight on for so long before one turns. **Units:** m.
+const AHEAD_M: f64 = 1.2;
+/// A way with less room than this beside it leads through a door. **Units:** m.
+const NARROW_M: f64 = 0.8;
+
+/// Where one turns who comes into an open area by a port: the port itself, but behind a door.
+fn ahead_of(free: &Free, sketch: &Sketch, port: usize) -> Point {
+    let here = sketch.dots[port].place;
+    let narrow = free.cell(here).is_some_and(|cell| f64::from(free.clearance[cell]) < NARROW_M);
+    let place = match sketch.dots[port].beside[..] {
+        [before] => {
+            let [x, y] = sketch.along(before, port);
+            beside(here, y.atan2(x))
+        }
+        [] => roomiest(free, here),
+        _ => return here,
+    };
+    if narrow && free.sees(here, place) { place } else { here }
+}
+
+fn beside([x, y]: Point, direction: f64) -> Point {
+    [x + AHEAD_M * direction.cos(), y + AHEAD_M * direction.sin()]
+}
+
+/// Where there is most room beside a place: ahead of a door behind which nothing is.
+fn roomiest(free: &Free, here: Point) -> Point {
+    const DIRECTIONS: i32 = 16;
+    let all = (0..DIRECTIONS).map(|part| beside(here, TAU * f64::from(part) / f64::from(DIRECTIONS)));
+    let room =
+        |place: &Point| free.cell(*place).filter(|&cell| free.free[cell]).map_or(0.0, |cell| free.clearance[cell]);
+    all.max_by(|a, b| room(a).total_cmp(&room(b))).unwrap_or(here)
 }
 
 /// Ports: where they are, and whether their way leads into the net along its rows. **Frame:** cells.
-fn ahead(free: &Free, sketch: &Sketch, ports: &[usize]) -> Vec<(Point, bool)> {
+fn rows_of(free: &Free, sketch: &Sketch, ports: &[usize]) -> Vec<(Point, bool)> {
     let along = |&port: &usize| {
         let here = free.to_cells(sketch.dots[port].place);
         let before = free.to_cells(sketch.dots[*sketch.dots[port].beside.first()?].place);
@@ -126,8 +231,10 @@ fn lattice(
     nodes.into_values().collect()
 }
 
-/// Joins a port with the nearest nodes of the net that it sees, three at most.
-fn join_port(free: &Free, sketch: &mut Sketch, port: usize, nodes: &[usize], edge_m: f64, fork: f64) {
+/// Joins a port with the nearest nodes of the net that it sees, three at most; one that is `joined` in its area with none that is
+/// far.
+fn join_port(free: &Free, sketch: &mut Sketch, port: usize, nodes: &[usize], [edge_m, fork]: [f64; 2], joined: bool) {
+    let alone = !joined;
     let here = sketch.dots[port].place;
     let far = |node: &usize| geometry::distance(sketch.dots[*node].place, here);
     let mut near: Vec<usize> = nodes.to_vec();
@@ -136,11 +243,11 @@ fn join_port(free: &Free, sketch: &mut Sketch, port: usize, nodes: &[usize], edg
         near.iter().map(|&node| (node, sketch.dots[node].place, far(&node))).collect();
     let mut joined = 0;
     for (node, place, distance) in reach {
-        if joined == 3 || joined > 0 && distance > 1.5 * edge_m {
+        if joined == 3 || (joined > 0 || !alone) && distance > 1.5 * edge_m {
             break;
         }
         let forks = sketch.forks(port, place, fork) || sketch.forks(node, here, fork);
-        if (joined == 0 || !forks) && free.sees(here, place) {
+        if (joined == 0 && alone || !forks) && free.sees(here, place) {
             sketch.join(port, node);
             joined += 1;
         }

@@ -2,6 +2,7 @@
 
 use super::free::Free;
 use crate::building::geometry::{self, Point};
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 /// What may be done to a node.
@@ -101,7 +102,7 @@ impl Sketch {
 
     /// Merges nodes that are joined by less than `shortest`, the shortest edge first.
     pub fn contract(&mut self, free: &Free, shortest: f64) {
-        let mut kept = std::collections::BTreeSet::new();
+        let mut kept = BTreeSet::new();
         loop {
             let short =
                 self.edges().filter(|edge| !kept.contains(edge)).map(|edge| (self.length(edge[0], edge[1]), edge));
@@ -128,13 +129,17 @@ impl Sketch {
         if hold == Hold::Fixed && other == Hold::Fixed {
             return false;
         }
-        let alike = weight(first) == weight(second) && hold == Hold::Loose;
-        let place = if alike { middle } else { self.dots[stays].place };
+        let alike = weight(first) == weight(second);
+        let (here, there) = (self.dots[stays].place, self.dots[goes].place);
+        let places = match hold {
+            Hold::Loose if alike => vec![middle, here, there],
+            Hold::Loose => vec![here, middle, there],
+            _ => vec![here],
+        };
         let mut others: Vec<usize> = first.beside.iter().chain(&second.beside).copied().collect();
         others.retain(|&other| other != a && other != b);
-        if !others.iter().all(|&other| free.sees(place, self.dots[other].place)) {
-            return false;
-        }
+        let sees = |place: &Point| others.iter().all(|&other| free.sees(*place, self.dots[other].place));
+        let Some(place) = places.into_iter().find(sees) else { return false };
         let port = self.dots[goes].port;
         self.remove(goes);
         self.dots[stays].place = place;
@@ -144,17 +149,28 @@ impl Sketch {
     }
 
     /// Takes nodes away where one goes straight on: where the next two see each other and the node lies within `off` of the
-    /// line between them.
-    pub fn straighten(&mut self, free: &Free, off: f64) {
+    /// line between them. Those that are held more than `most` stay.
+    pub fn straighten(&mut self, free: &Free, off: f64, most: Hold) {
         for dot in 0..self.dots.len() {
             let [a, b] = self.dots[dot].beside[..] else { continue };
             let (from, to) = (self.dots[a].place, self.dots[b].place);
             let here = self.dots[dot].place;
             let far = geometry::distance(geometry::nearest(&[from, to], here), here);
-            let fits = self.dots[dot].hold != Hold::Fixed && !self.dots[dot].port && far <= off;
+            let fits = self.dots[dot].hold <= most && !self.dots[dot].port && far <= off;
             if fits && !self.dots[a].beside.contains(&b) && free.sees(from, to) {
                 self.remove(dot);
                 self.join(a, b);
+            }
+        }
+    }
+
+    /// Straightens until nothing changes: a way between two places that are held, or where ways meet, is pulled as a string.
+    pub fn pull(&mut self, free: &Free, off: f64) {
+        loop {
+            let before = self.dots.iter().filter(|dot| dot.gone).count();
+            self.straighten(free, off, Hold::Loose);
+            if self.dots.iter().filter(|dot| dot.gone).count() == before {
+                return;
             }
         }
     }
@@ -188,21 +204,26 @@ impl Sketch {
     /// Cuts edges that are longer than `longest` into equal ones of about `wanted`.
     pub fn split(&mut self, wanted: f64, longest: f64) {
         for [a, b] in self.edges().collect::<Vec<_>>() {
-            let length = self.length(a, b);
-            if length <= longest {
-                continue;
-            }
-            let count = (length / wanted).round().max(2.0) as usize;
-            let (from, to) = (self.dots[a].place, self.dots[b].place);
-            self.part(a, b);
-            let mut last = a;
-            for part in 1..count {
-                let dot = self.add(geometry::between(from, to, part as f64 / count as f64), Hold::Loose);
-                self.join(last, dot);
-                last = dot;
-            }
-            self.join(last, b);
+            self.split_edge(a, b, wanted, longest);
         }
+    }
+
+    /// Cuts an edge if it is longer than `longest` into equal ones of about `wanted`.
+    pub fn split_edge(&mut self, a: usize, b: usize, wanted: f64, longest: f64) {
+        let length = self.length(a, b);
+        if length <= longest {
+            return;
+        }
+        let count = (length / wanted).round().max(2.0) as usize;
+        let (from, to) = (self.dots[a].place, self.dots[b].place);
+        self.part(a, b);
+        let mut last = a;
+        for part in 1..count {
+            let dot = self.add(geometry::between(from, to, part as f64 / count as f64), Hold::Loose);
+            self.join(last, dot);
+            last = dot;
+        }
+        self.join(last, b);
     }
 
     /// Lays nodes that are joined nearly along the cells on one line: what is straight in the building becomes straight.
@@ -270,9 +291,9 @@ impl Sketch {
     }
 
     /// Models crossings for those who cut the corner (Graph, 7.1 and figure 7.1): joins the ways that leave a node at about a
-    /// right angle, so far from it that the way between them is free.
-    pub fn diagonals(&mut self, free: &Free, least_fork: f64, [nearest, farthest]: [f64; 2]) {
-        for corner in 0..self.dots.len() {
+    /// right angle, so far from it that the way between them is free. Those of a net have theirs.
+    pub fn diagonals(&mut self, free: &Free, least_fork: f64, [nearest, farthest]: [f64; 2], nets: &BTreeSet<usize>) {
+        for corner in (0..self.dots.len()).filter(|corner| !nets.contains(corner)) {
             let beside = self.dots[corner].beside.clone();
             for (first, second) in
                 beside.iter().enumerate().flat_map(|(i, &a)| beside[i + 1..].iter().map(move |&b| (a, b)))
@@ -280,7 +301,8 @@ impl Sketch {
                 // A diagonal before may have cut one of them.
                 let arms = [first, second].map(|to| self.arm(corner, to));
                 let angle = angle_between(self.along(corner, arms[0]), self.along(corner, arms[1]));
-                if (angle - 0.5 * PI).abs() > PI / 6.0 || self.dots[arms[0]].beside.contains(&arms[1]) {
+                let in_net = arms.iter().any(|arm| nets.contains(arm));
+                if in_net || (angle - 0.5 * PI).abs() > PI / 6.0 || self.dots[arms[0]].beside.contains(&arms[1]) {
                     continue;
                 }
                 let lengths = arms.map(|arm| self.length(corner, arm));
@@ -316,7 +338,7 @@ impl Sketch {
     }
 
     /// The node at a part of an edge, made if it is not there.
-    fn cut(&mut self, from: usize, to: usize, part: f64) -> usize {
+    pub fn cut(&mut self, from: usize, to: usize, part: f64) -> usize {
         if part >= 1.0 {
             return to;
         }
