@@ -15,6 +15,10 @@ const CLEAR_M: f64 = 0.28;
 const COMFORTABLE_M: f64 = 0.7;
 /// How much longer a way in the uncomfortable part counts.
 const DISLIKE: u32 = 2;
+/// Who walks along the middle of corridors keeps so far from walls, if there is room. **Units:** m.
+const MIDDLE_M: f64 = 1.5;
+/// And turns so far beside where the straightest way does at most. **Units:** m.
+const ASIDE_M: f64 = 1.2;
 /// Length of a straight and of a diagonal move, in hundredths of a cell.
 const STRAIGHT: u32 = 100;
 const DIAGONAL: u32 = 141;
@@ -80,12 +84,27 @@ pub fn plan(building: &Building, stops: &[&str]) -> Result<Vec<Piece>, Error> {
 pub struct Planner<'a> {
     building: &'a Building,
     free: Vec<Free<'a>>,
+    manner: Manner,
+}
+
+/// How people walk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Manner {
+    /// As straight as walls let them, across corridors too.
+    Straight,
+    /// Straight out of a room to the middle of a corridor, along it, and straight into the next room.
+    Middle,
 }
 
 impl<'a> Planner<'a> {
-    /// Looks at all floors.
+    /// Looks at all floors, for people who go as straight as walls let them.
     pub fn new(building: &'a Building) -> Self {
-        Self { building, free: building.floors.iter().map(|floor| Free::new(building, floor)).collect() }
+        Self::with(building, Manner::Straight)
+    }
+
+    /// Looks at all floors.
+    pub fn with(building: &'a Building, manner: Manner) -> Self {
+        Self { building, free: building.floors.iter().map(|floor| Free::new(building, floor)).collect(), manner }
     }
 
     /// The pieces of a way through `stops`: names of rooms (`101`, or with the floor's name before them, `F1/101`), and
@@ -114,6 +133,15 @@ impl<'a> Planner<'a> {
         }
         if here.is_none() {
             return Err(Error::Model("a route needs a room to start from".to_owned()));
+        }
+        if self.manner == Manner::Middle {
+            for piece in &mut pieces {
+                if let Piece::Walk { floor, points } = piece
+                    && let Some(free) = self.free.iter().find(|free| free.floor.number == *floor)
+                {
+                    free.to_the_middle(points);
+                }
+            }
         }
         Ok(pieces)
     }
@@ -342,6 +370,41 @@ impl<'a> Free<'a> {
         pulled
     }
 
+    /// Moves where a way turns along the lines to and from there, to where there is more room: into the middle of a corridor.
+    fn to_the_middle(&self, points: &mut [Point]) {
+        const PARTS: i32 = 16;
+        for at in 1..points.len().saturating_sub(1) {
+            let [before, here, after] = [points[at - 1], points[at], points[at + 1]];
+            let mut best = (self.room(here), here);
+            for other in [before, after] {
+                let long = geometry::distance(other, here);
+                for part in -PARTS..=PARTS {
+                    let off_m = ASIDE_M * f64::from(part) / f64::from(PARTS);
+                    let place = geometry::between(other, here, 1.0 + off_m / long);
+                    let fits = off_m > -long && self.is_free([before, place]) && self.is_free([place, after]);
+                    if fits && self.room(place) > best.0 + 1e-6 {
+                        best = (self.room(place), place);
+                    }
+                }
+            }
+            points[at] = best.1;
+        }
+    }
+
+    /// How far from the next wall a place is; all that is more than enough is alike. **Units:** m.
+    fn room(&self, place: Point) -> f64 {
+        let walls = self.floor.walls.iter();
+        walls.map(|wall| geometry::distance(geometry::nearest(wall, place), place)).fold(MIDDLE_M, f64::min)
+    }
+
+    fn is_free(&self, [a, b]: geometry::Segment) -> bool {
+        let count = (geometry::distance(a, b) / (0.5 * CELL_M)).ceil() as usize;
+        (1..count).all(|i| {
+            let place = geometry::between(a, b, i as f64 / count as f64);
+            self.cell(place).is_some_and(|cell| self.cost[cell] > 0)
+        })
+    }
+
     fn sees(&self, points: &[Point], from: usize, to: usize) -> bool {
         let cost = |point: Point| self.cell(point).map_or(0, |cell| self.cost[cell]);
         // What was uncomfortable on the way may be so on the straight line.
@@ -391,6 +454,28 @@ mod tests {
                 assert_eq!(pair[0].1.last(), pair[1].1.first());
             }
         }
+    }
+
+    #[test]
+    fn who_keeps_to_the_middle_walks_there_along_a_corridor_and_straight_through_doors() {
+        let building = generate::twin(1);
+        let floor = &building.floors[0];
+        let inside = |manner: Manner| -> Vec<Point> {
+            let pieces = Planner::with(&building, manner).plan(&["W01", "W08", "W05"]).unwrap();
+            let points = pieces.iter().filter_map(|piece| match piece {
+                Piece::Walk { points, .. } => Some(points),
+                _ => None,
+            });
+            let all: Vec<&Vec<Point>> = points.collect();
+            assert!(all.iter().all(|points| !crosses(floor, points)));
+            all.into_iter().flatten().copied().filter(|[_, y]| (6.0..8.2).contains(y)).collect()
+        };
+        // The corridor is 2.2 m wide: within a quarter of that.
+        let off = |points: Vec<Point>| points.iter().map(|[_, y]| (y - 7.1).abs()).fold(0.0, f64::max);
+        let (straight, middle) = (inside(Manner::Straight), inside(Manner::Middle));
+        assert_eq!(straight.len(), middle.len());
+        let (straight, middle) = (off(straight), off(middle));
+        assert!(middle < 0.55 && straight > 0.8, "{middle} {straight}");
     }
 
     #[test]

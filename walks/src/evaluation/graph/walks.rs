@@ -1,6 +1,6 @@
 //! Walks of a phone through the rooms of a building, and all that the methods need of it.
 
-use crate::building::route::{Piece, Planner};
+use crate::building::route::{Manner, Piece, Planner};
 use crate::building::{Building, ConnectorKind, Error, geometry};
 use crate::graph::Graph;
 use crate::graph::draw::{self, draw};
@@ -48,7 +48,7 @@ impl Site {
 /// # Errors
 /// When the building has no rooms that one can walk between.
 pub fn random_walks(site: &Site, count: usize, seed: u64, done: impl Fn() + Sync) -> Result<Vec<PhoneWalk>, Error> {
-    let planner = Planner::new(&site.building);
+    let planner = Planner::with(&site.building, Manner::Middle);
     let walk = |index: usize| {
         let seed = seed.wrapping_mul(10_000).wrapping_add(index as u64);
         let part = (index as f64 + 0.5) / count as f64;
