@@ -54,6 +54,13 @@ impl Floors {
         self.here
     }
 
+    /// The next floor below another.
+    pub(super) fn below(&self, floor: i32) -> Option<i32> {
+        let height_m = self.height_of(floor);
+        let lower = self.heights.iter().filter(|(_, height)| *height < height_m);
+        lower.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| *number)
+    }
+
     fn height_of(&self, floor: i32) -> f64 {
         self.heights.iter().find(|(number, _)| *number == floor).map_or(0.0, |(_, height)| *height)
     }
@@ -87,6 +94,15 @@ impl Tracker<'_> {
         edge.kind != EdgeKind::Level || on_floor.is_none_or(|(number, _)| *number == floors.here)
     }
 
+    /// Whether an edge belongs to stairs from the floor below: the document draws stairs on both floors that they join.
+    pub(super) fn climbs_to(&self, id: EdgeId, floor: i32) -> bool {
+        let Some(floors) = &self.floors else { return false };
+        let edge = self.graph.edge(id);
+        let [from, to] = [edge.from, edge.to].map(|node| self.graph.node(node));
+        let on_floor = floors.heights.iter().any(|(_, height)| (height - from.height_m).abs() < LEVEL_M);
+        (edge.kind == EdgeKind::Stairs || !on_floor) && floors.below(floor) == Some(from.floor.min(to.floor))
+    }
+
     /// Begins anew on the new floor (Graph, 6.11).
     pub(super) fn change_floor(&mut self, change: Change) {
         let place = self.graph.on(self.edge, self.along_m);
@@ -97,6 +113,7 @@ impl Tracker<'_> {
         };
         let Some((edge, along_m)) = begin else { return };
         self.held.clear();
+        self.searched = None;
         self.by_turn = false;
         if edge != self.edge {
             self.turned_at = self.graph.edge(edge).from;

@@ -281,9 +281,10 @@ impl<'a> Tracker<'a> {
         self.turn_onto(best.edge, held.max(length_m), length_m);
     }
 
-    /// A clean turn: the error begins anew.
+    /// A clean turn: the error begins anew, and a search before it has found the right edge.
     fn turn_onto(&mut self, edge: EdgeId, metres: f64, length_m: f64) {
         self.held.clear();
+        self.searched = None;
         self.turned_at = self.graph.edge(edge).from;
         self.trail = vec![edge];
         self.along_m = 0.0;

@@ -21,7 +21,7 @@ impl Tracker<'_> {
         let passed =
             |edge: EdgeId| self.trail.iter().any(|&passed| passed == edge || self.graph.edge(passed).back == edge);
         let fitting = self.graph.edge_ids().filter(|&edge| {
-            start(edge).floor == floor
+            (start(edge).floor == floor || self.climbs_to(edge, floor))
                 && self.graph.edge(edge).kind != EdgeKind::Elevator
                 && !passed(edge)
                 && self.is_open(edge)

@@ -277,6 +277,19 @@ fn case_5_decision_x_the_steps_between_two_searches_count() {
     assert!(distance(search.from, [3.0 * STEP - 6.0 * STEP, 7.0 * STEP]) < 1e-9, "{decision}");
 }
 
+#[test]
+fn case_5_decision_x_a_search_after_a_clean_turn_is_a_first_one() {
+    let places = [[0.0, 0.0], [6.0, 0.0], [3.0, 1.0], [3.0, 5.0], [9.0, 5.0]];
+    let graph = graph(&places, &[[0, 1], [1, 2], [2, 3], [3, 4]]);
+    let mut tracker = tracker(&graph);
+    walk(&mut tracker, &NORTH_AFTER_THREE);
+    let turn = walk(&mut tracker, &[0.0, 0.0, -90.0]);
+    assert_eq!((turn.case, turn.edge), (Case::Turn, edge(&graph, 3, 4)));
+    let before = walk(&mut tracker, &[0.0, 0.0, 0.0]).place;
+    let search = walk(&mut tracker, &[-90.0, 0.0, 0.0, 0.0, 0.0, 0.0]).search.unwrap();
+    assert!(distance(search.from, [before[0], before[1] - 6.0 * STEP]) < 1e-9, "{search:?}");
+}
+
 /// Two floors, 3.6 m apart, with stairs in two flights from node 1 to node 4 and an elevator from node 6 to node 7.
 fn two_floors() -> (Graph, Floors) {
     let node = |floor: i32, place: Point, height_m: f64| Node { floor, place, height_m };
@@ -327,6 +340,18 @@ fn floors_rule_1_and_figure_6_44_the_last_position_is_projected_onto_the_stairs_
     assert_eq!(decision.change, Some(Change { from: 0, to: 1, by: By::Stairs }));
     assert_eq!(decision.edge, edge(&graph, 3, 4));
     assert!(is_at(&decision, [2.0, 3.0 - 6.0 * 0.3]));
+}
+
+#[test]
+fn floors_stairs_are_searched_from_both_floors_that_they_join() {
+    let (graph, floors) = two_floors();
+    let tracker = Tracker::new(&graph, &Parameters::documented(), edge(&graph, 3, 4), 0.0);
+    let mut tracker = tracker.with_barometer(floors);
+    let up = climb(&mut tracker, &[(0.0, 1.8), (0.0, 0.3), (0.0, 0.3), (0.0, 0.3)]);
+    assert_eq!(up.change, Some(Change { from: 0, to: 1, by: By::Stairs }));
+    // Towards the lower flight, whose nodes are numbered with the lower floor.
+    let decision = climb(&mut tracker, &[(90.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)]);
+    assert!(decision.candidates.iter().any(|candidate| candidate.edge == edge(&graph, 3, 2)), "{decision}");
 }
 
 #[test]
