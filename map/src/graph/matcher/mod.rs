@@ -24,9 +24,9 @@
 //!
 //! # Example
 //! ```
-//! use sohle::building::{Node, WalkGraph};
-//! use sohle::graph::Graph;
-//! use sohle::graph::matcher::{Matcher, Parameters, Place, Start};
+//! use sohle_map::building::{Node, WalkGraph};
+//! use sohle_map::graph::Graph;
+//! use sohle_map::graph::matcher::{Matcher, Parameters, Place, Start};
 //!
 //! let node = |x, y| Node { place: [x, y], ..Node::default() };
 //! let drawn = WalkGraph { nodes: vec![node(0.0, 0.0), node(5.0, 0.0), node(5.0, 5.0)], edges: vec![[0, 1], [1, 2]] };
@@ -35,7 +35,7 @@
 //! let matcher = Matcher::new(&graph, &Parameters::default(), &Start::At(vec![place]))?;
 //! let here = &matcher.estimate().places[0];
 //! assert!(here.probability > 0.99 && here.position[0].abs() < 1e-9);
-//! # Ok::<(), sohle::graph::Error>(())
+//! # Ok::<(), sohle_map::graph::Error>(())
 //! ```
 
 mod estimate;
