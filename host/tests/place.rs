@@ -76,7 +76,7 @@ fn what_makes_no_sense_is_told_before_anything_is_written() {
     };
     assert!(replay("7,1,1").contains("the building has no floor 7 to start on; it has 0, 1"));
     assert!(replay("0,-5,1").contains("is outside of the building"));
-    assert!(replay("somewhere").contains("expected anywhere, entrances, the name of a room"));
+    assert!(replay("somewhere").contains("expected anywhere, entrances, the name of a room or of an entrance"));
     assert!(!folder.join("out").exists());
 }
 

@@ -64,13 +64,11 @@ pub fn cargo() -> Command {
 
 /// Builds a program of the workspace and tells where it is. `kind` is `--bin` or `--example`.
 ///
-/// The whole workspace is named so that features are unified as in the tests, whose libraries are then built already. What is
+/// The whole workspace is named with all features, as in the tests, whose libraries are then built already. What is
 /// released here is measured, not looked at: without the window it is built in half the time.
 pub fn build(profile: &str, kind: &str, name: &str) -> Result<PathBuf, Failure> {
     let mut words = vec!["build", "--locked", "--workspace", "--profile", profile, kind, name];
-    if profile == "release" {
-        words.push("--no-default-features");
-    }
+    words.push(if profile == "release" { "--no-default-features" } else { "--all-features" });
     run(cargo().args(&words))?;
     // Built now: the second call only says where, wherever the target folder of this machine may be.
     let said = read(cargo().args(&words).args(["--message-format", "json"]))?;

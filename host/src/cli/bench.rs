@@ -1,4 +1,4 @@
-//! `sohle bench`: what the particle filter costs on this machine, and what steps with positions do.
+//! `sohle bench`: what the particle filter costs on this machine, what steps with positions do, and what the matcher on a walk graph.
 
 use super::table::Table;
 use super::{Error, print};
@@ -6,11 +6,13 @@ use crate::evaluation::fixes::pace::{STEP_US, Walker};
 use crate::fixes::adjustment::Adjustment;
 use crate::fixes::extended::Extended;
 use crate::fixes::{Documented, Method, Smoother, Start, smoother};
+use crate::graph::speed as corridors;
 use crate::particle::speed::{Work, building};
 use clap::ValueEnum;
 use std::time::{Duration, Instant};
 
-/// Times the particle filter over particles, walls and floors, and steps with positions over the length of the walk
+/// Times the particle filter over particles, walls and floors, steps with positions over the length of the walk, and the matcher over
+/// the size of the walk graph
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Each figure is the median of several runs. The reference is a textbook's move without walls, in the same \
@@ -77,11 +79,14 @@ pub fn run(args: Args) -> Result<(), Error> {
     }
     bar.finish_and_clear();
     let paces: Vec<Pace> = HOURS.into_iter().flat_map(paces).collect();
+    let matches = MATCHED.into_iter().map(|(edges, known)| matched(edges, known)).collect::<Result<Vec<_>, _>>()?;
     match args.format {
-        Format::Table => print(&[table(&rows), paces_table(&paces)].map(|table| table.text()).join("\n")),
+        Format::Table => {
+            print(&[table(&rows), paces_table(&paces), matches_table(&matches)].map(|table| table.text()).join("\n"))
+        }
         Format::Json => print(&format!(
             "{}\n",
-            serde_json::to_string_pretty(&serde_json::json!({"particles": rows, "fixes": paces}))?
+            serde_json::to_string_pretty(&serde_json::json!({"particles": rows, "fixes": paces, "graph": matches}))?
         )),
     }
 }
@@ -136,6 +141,45 @@ fn paces_table(paces: &[Pace]) -> Table {
         cells.extend([pace.median_us, pace.longest_us].map(|us| format!("{us:.1}")));
         cells.push(format!("{:.2}", pace.median_us / first));
         table.row(pace.method, cells);
+    }
+    table
+}
+
+/// Graphs with so many directed edges, and whether the start is known.
+const MATCHED: [(usize, bool); 4] = [(1_000, true), (10_000, true), (100_000, true), (100_000, false)];
+/// So many steps on each are timed, from the first.
+const WALKED: usize = 1_000;
+
+/// Steps on a walk graph. **Units:** as the names say.
+#[derive(serde::Serialize)]
+struct Matched {
+    edges: usize,
+    start: &'static str,
+    median_us: f64,
+    longest_us: f64,
+}
+
+fn matched(edges: usize, known: bool) -> Result<Matched, Error> {
+    let mut work = corridors::Work::new(edges, known)?;
+    let mut times: Vec<Duration> = (0..WALKED)
+        .map(|_| {
+            let start = Instant::now();
+            work.step();
+            start.elapsed()
+        })
+        .collect();
+    times.sort_unstable();
+    let us = |time: Duration| time.as_secs_f64() * 1e6;
+    let start = if known { "known" } else { "anywhere" };
+    Ok(Matched { edges: work.edges(), start, median_us: us(times[WALKED / 2]), longest_us: us(times[WALKED - 1]) })
+}
+
+fn matches_table(matches: &[Matched]) -> Table {
+    let mut table = Table::new("a step on a walk graph", &["edges", "median us", "longest us"]);
+    for matched in matches {
+        let mut cells = vec![matched.edges.to_string()];
+        cells.extend([matched.median_us, matched.longest_us].map(|us| format!("{us:.1}")));
+        table.row(format!("start {}", matched.start), cells);
     }
     table
 }

@@ -40,7 +40,7 @@ pub struct Args {
     /// Follows the steps through this building: any format that 'sohle building show' takes
     #[arg(long, value_name = "FILE|DIR", requires = "what")]
     building: Option<PathBuf>,
-    /// Where the walk begins: anywhere, entrances, a room, or FLOOR,X,Y or FLOOR,X,Y,HEADING_DEG [default: anywhere]
+    /// Where the walk begins: anywhere, entrances, a room or an entrance by its name, FLOOR,X,Y or FLOOR,X,Y,HEADING_DEG [default: anywhere]
     #[arg(long, value_name = "WHERE", allow_hyphen_values = true, requires = "building")]
     start: Option<String>,
     /// How the recording is laid out; recognised from the content when left out

@@ -17,6 +17,7 @@ pub mod matcher;
 mod model;
 pub mod paths;
 pub mod route;
+pub mod speed;
 pub mod tracker;
 
 pub use error::Error;

@@ -13,7 +13,9 @@ pub enum Error {
     #[error(transparent)]
     Building(#[from] building::Error),
     /// A start in words that mean nothing.
-    #[error("--start '{0}': expected anywhere, entrances, the name of a room, or FLOOR,X,Y[,HEADING_DEG] in numbers")]
+    #[error(
+        "--start '{0}': expected anywhere, entrances, the name of a room or of an entrance, or FLOOR,X,Y[,HEADING_DEG] in numbers"
+    )]
     Start(String),
     /// A start at entrances that are not there.
     #[error("the building has no entrances to start from")]

@@ -1,7 +1,7 @@
 //! Where a walk begins, in words.
 
 use super::Error;
-use crate::building::{Building, geometry};
+use crate::building::{Building, Entrance, geometry};
 use crate::particle::{Start, StartPlace};
 
 /// How well somebody knows a place whose coordinates were given (standard deviation). **Units:** m.
@@ -11,19 +11,20 @@ const GIVEN_HEADING_SIGMA: f32 = 0.2;
 /// And that it was this entrance. **Units:** m.
 const ENTRANCE_SIGMA_M: f32 = 1.0;
 
-/// What a start in words means in a building: `anywhere`, `entrances`, the name of a room, or `FLOOR,X,Y[,HEADING_DEG]`.
+/// What a start in words means in a building: `anywhere`, `entrances`, the name of a room or of an entrance, or
+/// `FLOOR,X,Y[,HEADING_DEG]`. A room comes before an entrance of its name.
 ///
 /// # Errors
 /// For words that mean nothing there, and for `entrances` where there are none.
 pub fn parse(building: &Building, text: &str) -> Result<Start, Error> {
+    let at = |entrance: &Entrance| StartPlace {
+        sigma_m: ENTRANCE_SIGMA_M,
+        ..StartPlace::exactly(entrance.floor, entrance.place.map(|value| value as f32))
+    };
     match text.trim() {
         "anywhere" => return Ok(Start::Anywhere),
         "entrances" => {
-            let place = |entrance: &crate::building::Entrance| StartPlace {
-                sigma_m: ENTRANCE_SIGMA_M,
-                ..StartPlace::exactly(entrance.floor, entrance.place.map(|value| value as f32))
-            };
-            let places: Vec<_> = building.entrances.iter().map(place).collect();
+            let places: Vec<_> = building.entrances.iter().map(at).collect();
             return if places.is_empty() { Err(Error::NoEntrances) } else { Ok(Start::At(places)) };
         }
         _ => {}
@@ -34,6 +35,9 @@ pub fn parse(building: &Building, text: &str) -> Result<Start, Error> {
         // An even distribution over a square has 0.29 of its side as standard deviation.
         let sigma_m = 0.29 * area.sqrt() as f32;
         return Ok(Start::At(vec![StartPlace { sigma_m, ..StartPlace::exactly(floor.number, middle) }]));
+    }
+    if let Some(entrance) = building.entrances.iter().find(|entrance| entrance.name == text.trim()) {
+        return Ok(Start::At(vec![at(entrance)]));
     }
     let wrong = || Error::Start(text.to_owned());
     let mut words = text.split(',').map(str::trim);
@@ -61,6 +65,7 @@ mod tests {
         };
         assert_eq!(parse(&building, "anywhere").unwrap(), Start::Anywhere);
         assert_eq!((at("entrances")[0].place, at("entrances")[0].floor), ([26.0, 0.3], 0));
+        assert_eq!(at("main"), at("entrances"));
         assert_eq!(at("1, 26,7")[0], StartPlace { floor: 1, place: [26.0, 7.0], sigma_m: 0.3, heading: None });
         assert!((at("0,26,7,-90")[0].heading.unwrap().0 + std::f32::consts::FRAC_PI_2).abs() < 1e-6);
         let room = at("F1/W16")[0];

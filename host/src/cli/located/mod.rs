@@ -30,7 +30,7 @@ pub struct InBuilding {
 /// How somebody is followed in it.
 #[derive(Clone, Debug, clap::Args)]
 pub struct How {
-    /// Where the walk begins: anywhere, entrances, a room, or FLOOR,X,Y or FLOOR,X,Y,HEADING_DEG [default: anywhere]
+    /// Where the walk begins: anywhere, entrances, a room or an entrance by its name, FLOOR,X,Y or FLOOR,X,Y,HEADING_DEG [default: anywhere]
     ///
     /// X east and Y north in metres of the building, the heading counter-clockwise from east.
     #[arg(long, value_name = "WHERE", allow_hyphen_values = true)]
