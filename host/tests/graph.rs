@@ -121,6 +121,15 @@ fn a_recorded_walk_is_followed_and_each_step_is_explained() {
     assert!(told.contains("edges chosen without a search") && told.contains("on floor 4"), "{told}");
     assert!(home.path().join("way/floor4.png").is_file());
     assert!(refused(home.path(), &[&begin[..], &["anywhere"]].concat()).contains("expected FLOOR,X,Y,HEADING_DEG"));
+    // Edges are searched for by map matching if that is asked for, by an option or by a settings file.
+    let matched = [&begin[..], &["4,76.7,33.4,-164", "--explain", "--search", "map-matching"]].concat();
+    let told = said(home.path(), &matched);
+    assert!(told.contains("map matching of ") && told.contains(" in ") && told.contains(" from node "), "{told}");
+    std::fs::write(home.path().join("settings.toml"), "search = \"map-matching\"\n").unwrap();
+    let by_file = [&begin[..], &["4,76.7,33.4,-164", "--explain", "--parameters", "settings.toml"]].concat();
+    assert_eq!(said(home.path(), &by_file), told);
+    let matcher = ["graph", &walk, "--building", &plan, "--start", "anywhere", "--search", "map-matching"];
+    assert!(refused(home.path(), &matcher).contains("--search: the matcher searches no edges"));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Laying an estimated track over its truth: turn and shift in the plane, never scale, never mirror.
 //!
 //! A dead-reckoned track has its own origin and heading; these three numbers must be taken out before it can be compared
-//! with surveyed positions. Its scale and its handedness are the tracker's own doing and stay in the error.
+//! with surveyed positions. Its scale and its handedness are the tracker's own doing and stay in the error. Where tracks are
+//! compared by their shape alone [`Helmert`] takes out the scale, too.
 
 /// A turn about the vertical and a shift. **Units:** 1, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,12 +29,7 @@ impl Rigid {
     }
 
     fn turn_about(from: &[[f64; 2]], to: &[[f64; 2]], pivot: [f64; 2], target: [f64; 2]) -> Self {
-        let (mut dot, mut cross) = (0.0, 0.0);
-        for (p, q) in from.iter().zip(to) {
-            let (p, q) = ([p[0] - pivot[0], p[1] - pivot[1]], [q[0] - target[0], q[1] - target[1]]);
-            dot += p[0] * q[0] + p[1] * q[1];
-            cross += p[0] * q[1] - p[1] * q[0];
-        }
+        let [dot, cross] = products(from, to, pivot, target);
         let norm = libm::hypot(dot, cross);
         let (cos, sin) = if norm > 0.0 { (dot / norm, cross / norm) } else { (1.0, 0.0) };
         let offset = [target[0] - cos * pivot[0] + sin * pivot[1], target[1] - sin * pivot[0] - cos * pivot[1]];
@@ -52,6 +48,57 @@ impl Rigid {
             self.sin * point[0] + self.cos * point[1] + self.offset[1],
         ]
     }
+}
+
+/// A turn, a scale and a shift: `X = a + c x - d y`, `Y = b + d x + c y`. **Units:** m and 1.
+///
+/// # Source
+/// Graph, equations 6.12 and 6.13.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Helmert {
+    /// Shift (`a` and `b`). **Units:** m.
+    pub offset: [f64; 2],
+    /// Scale times cosine and sine of the turn (`c` and `d`).
+    pub turn: [f64; 2],
+}
+
+impl Helmert {
+    /// What lays `from` over `to` with the least sum of squared distances (Graph, equations 6.14 to 6.16, whose normal
+    /// equations have a closed form about the centroids). Points that all coincide are only shifted.
+    pub fn fit(from: &[[f64; 2]], to: &[[f64; 2]]) -> Self {
+        let (pivot, target) = (centroid(from), centroid(to));
+        let [dot, cross] = products(from, to, pivot, target);
+        let [spread, _] = products(from, from, pivot, pivot);
+        let [c, d] = if spread > 0.0 { [dot / spread, cross / spread] } else { [1.0, 0.0] };
+        let offset = [target[0] - c * pivot[0] + d * pivot[1], target[1] - d * pivot[0] - c * pivot[1]];
+        Self { offset, turn: [c, d] }
+    }
+
+    /// Where a point comes to lie. **Units:** m.
+    pub fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [c, d] = self.turn;
+        [self.offset[0] + c * x - d * y, self.offset[1] + d * x + c * y]
+    }
+
+    /// Sum of the squared distances that remain (`v^T v`, Graph, equation 6.16). **Units:** m².
+    pub fn residual(&self, from: &[[f64; 2]], to: &[[f64; 2]]) -> f64 {
+        let squared = |(&p, &q): (&[f64; 2], &[f64; 2])| {
+            let off = distance(self.apply(p), q);
+            off * off
+        };
+        from.iter().zip(to).map(squared).sum()
+    }
+}
+
+/// Sums of the scalar and the cross products of two lists of points about a place of each.
+fn products(from: &[[f64; 2]], to: &[[f64; 2]], pivot: [f64; 2], target: [f64; 2]) -> [f64; 2] {
+    let (mut dot, mut cross) = (0.0, 0.0);
+    for (p, q) in from.iter().zip(to) {
+        let (p, q) = ([p[0] - pivot[0], p[1] - pivot[1]], [q[0] - target[0], q[1] - target[1]]);
+        dot += p[0] * q[0] + p[1] * q[1];
+        cross += p[0] * q[1] - p[1] * q[0];
+    }
+    [dot, cross]
 }
 
 /// Horizontal distance of two points. **Units:** m.
@@ -147,6 +194,17 @@ mod tests {
     }
 
     #[test]
+    fn helmert_takes_out_turn_scale_and_shift() {
+        let truth = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]];
+        let moved = truth.map(|[x, y]| [5.0 - 1.5 * y, -3.0 + 1.5 * x]);
+        let helmert = Helmert::fit(&truth, &moved);
+        assert!((helmert.turn[0].abs() < 1e-12) && (helmert.turn[1] - 1.5).abs() < 1e-12, "{helmert:?}");
+        assert!(helmert.residual(&truth, &moved) < 1e-12);
+        let one = [[1.0, 1.0]; 3];
+        assert_eq!(Helmert::fit(&one, &[[2.0, 4.0]; 3]).apply([1.0, 1.0]), [2.0, 4.0]);
+    }
+
+    #[test]
     fn nothing_to_compare_is_no_figure() {
         assert_eq!(rigid_rmse(&[], &[]), None);
         assert_eq!(end_error(&[[0.0; 2]], &[[1.0; 2]]), None);
@@ -173,6 +231,19 @@ mod tests {
             // 1e-6 m: rounding of coordinates of 100 m, made worse by nearly undetermined turns.
             let (before, after) = (rigid_rmse(&estimated, &truth), rigid_rmse(&moved, &truth));
             prop_assert!((before.unwrap() - after.unwrap()).abs() < 1e-6);
+        }
+
+        /// Law: the solution of the normal equations is a minimum.
+        #[test]
+        fn no_other_helmert_transformation_is_better(pairs in points(), change in proptest::array::uniform4(-0.5..0.5_f64)) {
+            let (from, to): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+            let best = Helmert::fit(&from, &to);
+            let [a, b, c, d] = change;
+            let other = Helmert {
+                offset: [best.offset[0] + a, best.offset[1] + b],
+                turn: [best.turn[0] + c, best.turn[1] + d],
+            };
+            prop_assert!(best.residual(&from, &to) <= other.residual(&from, &to) + 1e-9);
         }
 
         /// Law: the fit is a minimum; no nearby turn or shift is better.

@@ -13,7 +13,7 @@ use crate::follow::sight;
 use crate::graph::Graph;
 use crate::graph::draw::{self, draw};
 use crate::graph::matcher::{self, Estimate, Matcher};
-use crate::graph::tracker::{Case, Decision, Floors, Parameters, Tracker, start};
+use crate::graph::tracker::{Case, Decision, Floors, Parameters, SearchBy, Tracker, start};
 use crate::particle::Start;
 use crate::recording::Recording;
 use crate::track::Track;
@@ -30,6 +30,7 @@ use std::path::{Path, PathBuf};
     sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164\n  \
     sohle graph eight_walk/ --building 4OG.geojson --start anywhere --explain\n  \
     sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164 --method documented --explain\n  \
+    sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164 --method documented --search map-matching\n  \
     sohle graph walk.mcap --building buildings/twin.geojson --start 0,26,0.3,90 --barometer --out way\n  \
     sohle graph walk.mcap --building buildings/twin.geojson --start anywhere --barometer --fixes positions.jsonl")]
 pub struct Args {
@@ -48,6 +49,9 @@ pub struct Args {
     /// Settings of the method in place of its own
     #[arg(long, value_name = "FILE.toml")]
     parameters: Option<PathBuf>,
+    /// By what the documented method searches an edge when five steps have fitted none, in place of what its settings say
+    #[arg(long, value_enum, value_name = "BY")]
+    search: Option<SearchBy>,
     /// Change floors by the heights that the steps tell (a phone's barometer, a shoe) too; as the document does, by nothing else
     #[arg(long)]
     barometer: bool,
@@ -92,6 +96,9 @@ pub fn run(args: Args) -> Result<(), Error> {
 
 /// Follows with several hypotheses. Returns floor and place after each step.
 fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, Point)>, Error> {
+    if args.search.is_some() {
+        return Err(Error::new("--search: the matcher searches no edges; expected --method documented"));
+    }
     let walk = read(&args.file, &phone::Parameters::default())?;
     let parameters = match &args.parameters {
         Some(path) => toml_file::read("settings of the matcher", path)?,
@@ -162,12 +169,15 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
     }
     let walk = read(&args.file, &phone::Parameters::documented())?;
     let documented = Parameters::documented();
-    let parameters = match &args.parameters {
+    let mut parameters = match &args.parameters {
         Some(path) => toml_file::read("settings of the tracker on a graph", path)?,
         None if walk.is_of_phone() => documented,
         // The foot of a shoe makes every other step, which is measured.
         None => Parameters { step_m: 0.0, ..documented },
     };
+    if let Some(search) = args.search {
+        parameters.search = search;
+    }
     let place = match follow::start::parse(building, &args.start)? {
         Start::At(places) => places.into_iter().next().and_then(|place| Some((place, place.heading?))),
         Start::Anywhere => None,
@@ -228,6 +238,7 @@ fn summary(graph: &Graph, decisions: &[Decision]) -> String {
         ("4 turn behind the end", Case::TurnBehindEnd),
         ("5 local search", Case::LocalSearch),
         ("5 global search", Case::GlobalSearch),
+        ("5 map matching", Case::MapMatching),
         ("waiting", Case::Waiting),
     ];
     let mut table = Table::new("case", &["steps", "%"]);
@@ -237,7 +248,7 @@ fn summary(graph: &Graph, decisions: &[Decision]) -> String {
         table.row(name, vec![count.to_string(), format!("{share:.1}")]);
     }
     let count = |cases: &[Case]| decisions.iter().filter(|decision| cases.contains(&decision.case)).count();
-    let searched = count(&[Case::LocalSearch, Case::GlobalSearch]);
+    let searched = decisions.iter().filter(|decision| decision.case.is_search()).count();
     let chosen = count(&[Case::HalfTurn, Case::Turn, Case::Beyond, Case::TurnBehindEnd]) + searched;
     let mut text = format!("{}\n", table.text());
     if chosen > 0 {

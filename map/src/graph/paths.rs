@@ -6,6 +6,7 @@
 use super::model::{Edge, EdgeId, Graph, NodeId};
 use crate::building::geometry;
 use pathfinding::prelude as find;
+use std::collections::HashMap;
 
 /// A way.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,32 +28,56 @@ pub fn plan_length(edge: &Edge) -> u64 {
 
 /// The shortest way, found by Dijkstra's algorithm.
 pub fn dijkstra(graph: &Graph, from: NodeId, to: NodeId, weight: impl Weight) -> Option<Path> {
-    let (nodes, weight_mm) = find::dijkstra(&from, |&node| beside(graph, node, &weight), |&node| node == to)?;
-    Some(path(graph, &nodes, weight_mm, &weight))
+    let (nodes, weight_mm) = find::dijkstra(&from, |&node| beside(graph, node, &weight, &every), |&node| node == to)?;
+    Some(path(graph, &nodes, weight_mm, &weight, &every))
 }
 
 /// The shortest way, found by A*: the same weight as [`dijkstra`]'s, where no edge weighs less than its [`plan_length`].
 pub fn astar(graph: &Graph, from: NodeId, to: NodeId, weight: impl Weight) -> Option<Path> {
     let goal = graph.node(to).place;
     let least = |&node: &NodeId| (geometry::distance(graph.node(node).place, goal) * 1e3).floor() as u64;
-    let (nodes, weight_mm) = find::astar(&from, |&node| beside(graph, node, &weight), least, |&node| node == to)?;
-    Some(path(graph, &nodes, weight_mm, &weight))
+    let (nodes, weight_mm) =
+        find::astar(&from, |&node| beside(graph, node, &weight, &every), least, |&node| node == to)?;
+    Some(path(graph, &nodes, weight_mm, &weight, &every))
 }
 
 /// The `count` shortest ways that visit no node twice, from the shortest on; fewer if there are not so many. Yen's algorithm.
 pub fn yen(graph: &Graph, from: NodeId, to: NodeId, count: usize, weight: impl Weight) -> Vec<Path> {
-    let found = find::yen(&from, |&node| beside(graph, node, &weight), |&node| node == to, count);
-    found.into_iter().map(|(nodes, weight_mm)| path(graph, &nodes, weight_mm, &weight)).collect()
+    yen_over(graph, from, to, count, weight, every)
 }
 
-/// What weighs least of the edges to each neighbour.
-fn beside(graph: &Graph, node: NodeId, weight: &impl Weight) -> Vec<(NodeId, u64)> {
-    graph.leaving(node).map(|id| graph.edge(id)).map(|edge| (edge.to, weight(edge))).collect()
+/// The same over some edges only.
+pub fn yen_over(
+    graph: &Graph,
+    from: NodeId,
+    to: NodeId,
+    count: usize,
+    weight: impl Weight,
+    open: impl Fn(EdgeId) -> bool,
+) -> Vec<Path> {
+    let found = find::yen(&from, |&node| beside(graph, node, &weight, &open), |&node| node == to, count);
+    found.into_iter().map(|(nodes, weight_mm)| path(graph, &nodes, weight_mm, &weight, &open)).collect()
 }
 
-fn path(graph: &Graph, nodes: &[NodeId], weight_mm: u64, weight: &impl Weight) -> Path {
+/// What the shortest ways over some edges weigh to each other node that they lead to. **Units:** mm.
+pub fn reach(graph: &Graph, from: NodeId, weight: impl Weight, open: impl Fn(EdgeId) -> bool) -> HashMap<NodeId, u64> {
+    let found = find::dijkstra_all(&from, |&node| beside(graph, node, &weight, &open));
+    found.into_iter().map(|(node, (_, weight_mm))| (node, weight_mm)).collect()
+}
+
+fn every(_: EdgeId) -> bool {
+    true
+}
+
+/// What weighs least of the open edges to each neighbour.
+fn beside(graph: &Graph, node: NodeId, weight: &impl Weight, open: &impl Fn(EdgeId) -> bool) -> Vec<(NodeId, u64)> {
+    let edges = graph.leaving(node).filter(|&id| open(id)).map(|id| graph.edge(id));
+    edges.map(|edge| (edge.to, weight(edge))).collect()
+}
+
+fn path(graph: &Graph, nodes: &[NodeId], weight_mm: u64, weight: &impl Weight, open: &impl Fn(EdgeId) -> bool) -> Path {
     let edge = |pair: &[NodeId]| {
-        let fitting = graph.leaving(pair[0]).filter(|&id| graph.edge(id).to == pair[1]);
+        let fitting = graph.leaving(pair[0]).filter(|&id| open(id) && graph.edge(id).to == pair[1]);
         fitting.min_by_key(|&id| weight(graph.edge(id)))
     };
     Path { edges: nodes.windows(2).filter_map(edge).collect(), weight_mm }
@@ -126,6 +151,13 @@ mod tests {
             let five = yen(&graph, from, to, 5, plan_length);
             truth.truncate(5);
             prop_assert_eq!(five.iter().map(|path| path.weight_mm).collect::<Vec<_>>(), truth);
+            let reached = reach(&graph, from, plan_length, every);
+            prop_assert_eq!(reached.get(&to).copied(), shortest.map(|path| path.weight_mm));
+            // Over the edges of all ways but one that one is missing.
+            if let Some(closed) = five.first().and_then(|path| path.edges.first()) {
+                let others = yen_over(&graph, from, to, 5, plan_length, |id| id != *closed);
+                prop_assert!(others.iter().all(|path| !path.edges.contains(closed)));
+            }
             for path in five {
                 prop_assert_eq!(path.edges.iter().map(|&id| plan_length(graph.edge(id))).sum::<u64>(), path.weight_mm);
                 prop_assert!(path.edges.windows(2).all(|pair| graph.edge(pair[0]).to == graph.edge(pair[1]).from));

@@ -1,6 +1,7 @@
 //! What the tracker decided at a step, and why.
 
 use super::floors::{By, Change};
+use super::matching::Matching;
 use crate::building::geometry::Point;
 use crate::graph::EdgeId;
 use std::fmt;
@@ -26,6 +27,8 @@ pub enum Case {
     LocalSearch,
     /// 5: found anywhere on the floor.
     GlobalSearch,
+    /// 5: at the end of the route whose shape is most like that of the steps.
+    MapMatching,
     /// 3 to 5: no edge fits yet.
     Waiting,
 }
@@ -38,9 +41,14 @@ impl Case {
             Self::HalfTurn | Self::HalfTurnBegun => Some(2),
             Self::Turn | Self::RestOfHalfTurn => Some(3),
             Self::Beyond | Self::TurnBehindEnd => Some(4),
-            Self::LocalSearch | Self::GlobalSearch => Some(5),
+            Self::LocalSearch | Self::GlobalSearch | Self::MapMatching => Some(5),
             Self::Waiting => None,
         }
+    }
+
+    /// Whether the edge was searched for.
+    pub fn is_search(self) -> bool {
+        self.number() == Some(5)
     }
 
     fn word(self) -> &'static str {
@@ -54,6 +62,7 @@ impl Case {
             Self::TurnBehindEnd => "turn behind the end",
             Self::LocalSearch => "local search",
             Self::GlobalSearch => "global search",
+            Self::MapMatching => "map matching",
             Self::Waiting => "waiting",
         }
     }
@@ -90,6 +99,8 @@ pub struct Decision {
     pub limit: f64,
     /// Where was searched, if it was.
     pub search: Option<Search>,
+    /// What came of map matching, if the edge was searched for by that.
+    pub matching: Option<Matching>,
     /// The floor was changed after that.
     pub change: Option<Change>,
     /// Steps held back, after the decision.
@@ -114,6 +125,9 @@ impl fmt::Display for Decision {
             self.delta.to_degrees(),
             self.window
         )?;
+        if let Some(matching) = &self.matching {
+            write!(out, ", {matching}")?;
+        }
         if let Some(Search { from: [x, y], radius_m }) = self.search {
             write!(out, ", searched within {radius_m:.1} m of ({x:.2}, {y:.2})")?;
         }

@@ -123,6 +123,7 @@ impl Tracker<'_> {
         self.behind_end = false;
         self.along_m = along_m;
         self.variance = super::Variance::default();
+        self.history = super::matching::History::begin(self.as_turn());
     }
 
     /// The edge that leaves the elevator on a floor nearest to a place; by the heading where it has two doors.
@@ -177,7 +178,7 @@ impl Tracker<'_> {
     }
 
     /// How far along an edge a place lies. **Units:** m.
-    fn projected(&self, id: EdgeId, place: Point) -> f64 {
+    pub(super) fn projected(&self, id: EdgeId, place: Point) -> f64 {
         let [from, _] = self.graph.ends(id);
         let (sin, cos) = self.graph.edge(id).direction.sin_cos();
         (place[0] - from[0]) * cos + (place[1] - from[1]) * sin

@@ -5,10 +5,11 @@
 //! so that the gyroscope drifts for one edge only.
 //!
 //! # Source
-//! Graph, 6.1 and 6.4 to 6.11 but for 6.10.2, figures 6.2 and 6.3. Where it leaves something open it is decided here, and said where.
+//! Graph, 6.1 and 6.4 to 6.11, figures 6.2 and 6.3. Where it leaves something open it is decided here, and said where.
 
 mod decision;
 mod floors;
+pub mod matching;
 mod parameters;
 mod search;
 mod start;
@@ -18,7 +19,7 @@ mod variance;
 
 pub use decision::{Candidate, Case, Decision, Search};
 pub use floors::{By, Change, Floors};
-pub use parameters::Parameters;
+pub use parameters::{Parameters, SearchBy};
 pub use start::start;
 pub use variance::Variance;
 
@@ -61,12 +62,14 @@ pub struct Tracker<'a> {
     variance: Variance,
     /// What the barometer tells, if there is one.
     floors: Option<Floors>,
+    /// What map matching compares routes to.
+    history: matching::History,
 }
 
 impl<'a> Tracker<'a> {
     /// Somebody begins so far along an edge, in its direction. **Units:** m.
     pub fn new(graph: &'a Graph, parameters: &Parameters, edge: EdgeId, along_m: f64) -> Self {
-        Self {
+        let mut begun = Self {
             graph,
             parameters: *parameters,
             edge,
@@ -81,7 +84,10 @@ impl<'a> Tracker<'a> {
             searched: None,
             variance: Variance::default(),
             floors: None,
-        }
+            history: matching::History::default(),
+        };
+        begun.history = matching::History::begin(begun.as_turn());
+        begun
     }
 
     /// Changes floors by the barometer, and by nothing else. Without this floors change where the edges of stairs lead.
@@ -100,6 +106,7 @@ impl<'a> Tracker<'a> {
         let before = self.delta;
         self.delta = wrapped(before + turn);
         let length_m = self.length(measured_m);
+        self.history.step(turn, length_m);
         let heading = self.heading();
         if let Some((from, _)) = &mut self.searched {
             *from = [from[0] + length_m * heading.cos(), from[1] + length_m * heading.sin()];
@@ -110,6 +117,7 @@ impl<'a> Tracker<'a> {
             candidates: Vec::new(),
             limit: self.parameters.fit_deg.to_radians(),
             search: None,
+            matching: None,
             change: None,
             window: 0,
             edge: self.edge,
@@ -200,6 +208,7 @@ impl<'a> Tracker<'a> {
         self.held.clear();
         self.by_turn = false;
         self.half_turned = true;
+        self.history = matching::History::begin(self.as_turn());
         Moved::On
     }
 
@@ -292,6 +301,9 @@ impl<'a> Tracker<'a> {
         self.by_turn = true;
         self.lay(metres, length_m);
         self.variance = Variance::default();
+        let node = self.turned_at;
+        let turn = matching::Turn { node, place: self.graph.node(node).place, ..self.as_turn() };
+        self.history.turned(turn, &self.parameters.matching);
     }
 
     /// The edges that leave a node on foot, by their angle to a heading.

@@ -1,5 +1,18 @@
 //! The thresholds of the documented tracker.
 
+use super::matching::Thresholds;
+
+/// By what case 5 chooses an edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum SearchBy {
+    /// Its direction and its distance (Graph, 6.10.1)
+    #[default]
+    Distance,
+    /// The shape of the route to it (Graph, 6.10.2), and by direction and distance where that tells nothing
+    MapMatching,
+}
+
 /// Settings of [`Tracker`](super::Tracker).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -21,6 +34,8 @@ pub struct Parameters {
     /// The end node of an edge counts as so much nearer than its start node (Graph, 6.8; SPEC section 8, decision 8).
     /// **Units:** m.
     pub end_favour_m: f64,
+    /// By what an edge is searched for: the document's results are by direction and distance (Graph, 6.10).
+    pub search: SearchBy,
     /// An edge that is searched for may be so far from the heading (Graph, 6.10.1). **Units:** degrees.
     pub search_deg: f64,
     /// It is searched for within so many standard deviations (Graph, 6.10.1).
@@ -43,6 +58,8 @@ pub struct Parameters {
     pub project_m: f64,
     /// Else on one that is no farther from the heading (Graph, 6.11). **Units:** degrees.
     pub stairs_deg: f64,
+    /// Of the search by map matching.
+    pub matching: Thresholds,
 }
 
 impl Default for Parameters {
@@ -63,6 +80,7 @@ impl Parameters {
             ahead_deg: 20.0,
             window: 5,
             end_favour_m: 1.5,
+            search: SearchBy::Distance,
             search_deg: 20.0,
             search_sigmas: 3.0,
             again_edges: 3,
@@ -74,6 +92,7 @@ impl Parameters {
             stairs_steps: 3,
             project_m: 0.5,
             stairs_deg: 35.0,
+            matching: Thresholds::documented(),
         }
     }
 }

@@ -1,7 +1,9 @@
-//! Case 5: an edge is searched for, near by and then anywhere (Graph, 6.10.1, figure 6.31).
+//! Case 5: an edge is searched for, near by and then anywhere (Graph, 6.10.1, figure 6.31); by map matching before that, if
+//! it is set so.
 
 use super::decision::{Candidate, Case, Decision, Search};
-use super::{Floors, Tracker, Variance};
+use super::matching::History;
+use super::{Floors, SearchBy, Tracker, Variance};
 use crate::building::geometry::{self, Point};
 use crate::graph::paths::{dijkstra, plan_length};
 use crate::graph::{EdgeId, EdgeKind};
@@ -9,6 +11,9 @@ use crate::graph::{EdgeId, EdgeKind};
 impl Tracker<'_> {
     /// Searches an edge for the steps that are held back. Without one they are held back further.
     pub(super) fn search(&mut self, length_m: f64, decision: &mut Decision) {
+        if self.parameters.search == SearchBy::MapMatching && self.match_route(length_m, decision) {
+            return;
+        }
         let from = self.search_from();
         let heading = self.heading();
         let limit = self.parameters.search_deg.to_radians();
@@ -58,6 +63,9 @@ impl Tracker<'_> {
         self.along_m = length_m.min(self.graph.edge(edge).length_m);
         self.spread(1, length_m);
         self.searched = Some((from, 0));
+        if !local {
+            self.history = History::begin(self.as_turn());
+        }
     }
 
     /// Where the steps that are held back lead to, from the last position. From where the last search began, over all steps

@@ -7,7 +7,7 @@ use crate::evaluation::phone::path::Path;
 use crate::evaluation::phone::walk::PhoneWalk;
 use crate::graph::draw::{self, draw};
 use crate::graph::matcher::{self, Matcher};
-use crate::graph::tracker::{self, Tracker};
+use crate::graph::tracker::{self, SearchBy, Tracker};
 use crate::graph::{self, Graph};
 use crate::particle::{self, ParticleFilter};
 use crate::phone;
@@ -73,6 +73,7 @@ impl<'a> Comparison<'a> {
             (DOCUMENTED, Method::DeadReckoning),
             (MEASURED, Method::DeadReckoning),
             (DOCUMENTED, Method::Documented),
+            (DOCUMENTED, Method::DocumentedMatching),
             (DOCUMENTED, Method::Matcher),
             (MEASURED, Method::Matcher),
             (MEASURED, Method::Particles),
@@ -113,10 +114,14 @@ impl<'a> Comparison<'a> {
         // What comes before the first way-point is not judged.
         match method {
             Method::DeadReckoning => return Ok(Some(laid)),
-            Method::Documented | Method::DocumentedBarometer => {
+            Method::Documented | Method::DocumentedBarometer | Method::DocumentedMatching => {
                 let (edge, along_m) =
                     tracker::start(&self.graph, floor, place, heading).ok_or(graph::Error::NoFloor(floor))?;
-                let mut tracker = Tracker::new(&self.graph, &tracker::Parameters::documented(), edge, along_m);
+                let mut parameters = tracker::Parameters::documented();
+                if method == Method::DocumentedMatching {
+                    parameters.search = SearchBy::MapMatching;
+                }
+                let mut tracker = Tracker::new(&self.graph, &parameters, edge, along_m);
                 for step in steps {
                     let decision = tracker.step(f64::from(step.turn), f64::from(step.length()), 0.0);
                     path.0.push((step.stance_end, decision.place));

@@ -4,7 +4,7 @@ use super::suite::Error;
 use super::walks::Site;
 use crate::building::geometry::Point;
 use crate::graph::matcher::{self, Matcher};
-use crate::graph::tracker::{self, Case, Floors, Tracker};
+use crate::graph::tracker::{self, Case, Floors, SearchBy, Tracker};
 use crate::particle::{self, ParticleFilter};
 use crate::simulation::phone::PhoneWalk;
 use std::time::{Duration, Instant};
@@ -24,6 +24,8 @@ pub enum Method {
     Documented,
     /// The same, floors by barometer.
     DocumentedBarometer,
+    /// The same, edges searched for by map matching.
+    DocumentedMatching,
     /// Several hypotheses on the graph, without heights.
     Matcher,
     /// The same with heights.
@@ -34,10 +36,11 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::DeadReckoning,
         Self::Documented,
         Self::DocumentedBarometer,
+        Self::DocumentedMatching,
         Self::Matcher,
         Self::MatcherBarometer,
         Self::Particles,
@@ -49,6 +52,7 @@ impl Method {
             Self::DeadReckoning => "dead reckoning",
             Self::Documented => "documented",
             Self::DocumentedBarometer => "documented, barometer",
+            Self::DocumentedMatching => "documented, matching",
             Self::Matcher => "matcher",
             Self::MatcherBarometer => "matcher, barometer",
             Self::Particles => "particle filter",
@@ -78,10 +82,12 @@ pub struct Followed {
 /// When the method refuses the building or the start.
 pub fn follow(site: &Site, walk: &PhoneWalk, method: Method, settings: &Settings) -> Result<Followed, Error> {
     let begun = Instant::now();
+    let barometer = || Floors::new(&site.building, walk.floors[0]);
     let mut followed = match method {
         Method::DeadReckoning => reckoned(site, walk),
-        Method::Documented => documented(site, walk, None)?,
-        Method::DocumentedBarometer => documented(site, walk, Floors::new(&site.building, walk.floors[0]))?,
+        Method::Documented => documented(site, walk, SearchBy::Distance, None)?,
+        Method::DocumentedBarometer => documented(site, walk, SearchBy::Distance, barometer())?,
+        Method::DocumentedMatching => documented(site, walk, SearchBy::MapMatching, barometer())?,
         Method::Matcher => matched(site, walk, &settings.matcher, false)?,
         Method::MatcherBarometer => matched(site, walk, &settings.matcher, true)?,
         Method::Particles => filtered(site, walk, settings)?,
@@ -120,11 +126,12 @@ fn reckoned(site: &Site, walk: &PhoneWalk) -> Followed {
     Followed { places: places.collect(), ..Followed::default() }
 }
 
-fn documented(site: &Site, walk: &PhoneWalk, floors: Option<Floors>) -> Result<Followed, Error> {
+fn documented(site: &Site, walk: &PhoneWalk, search: SearchBy, floors: Option<Floors>) -> Result<Followed, Error> {
     let graph = &site.graph;
     let start = tracker::start(graph, walk.floors[0], begin(walk), walk.heading);
     let (edge, along_m) = start.ok_or(crate::graph::Error::NoFloor(walk.floors[0]))?;
-    let mut tracker = Tracker::new(graph, &tracker::Parameters::documented(), edge, along_m);
+    let parameters = tracker::Parameters { search, ..tracker::Parameters::documented() };
+    let mut tracker = Tracker::new(graph, &parameters, edge, along_m);
     if let Some(floors) = floors {
         tracker = tracker.with_barometer(floors);
     }
@@ -134,7 +141,7 @@ fn documented(site: &Site, walk: &PhoneWalk, floors: Option<Floors>) -> Result<F
         if number > 0 {
             let rise = f64::from(step.displacement.z);
             let decision = tracker.step(f64::from(step.turn), f64::from(step.length()), rise);
-            let searched = matches!(decision.case, Case::LocalSearch | Case::GlobalSearch);
+            let searched = decision.case.is_search();
             let chosen = matches!(decision.case, Case::HalfTurn | Case::Turn | Case::Beyond | Case::TurnBehindEnd);
             followed.chosen[0] += usize::from(searched || chosen);
             followed.chosen[1] += usize::from(searched);
