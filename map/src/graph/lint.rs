@@ -9,7 +9,7 @@ use super::model::{EdgeId, EdgeKind, Graph, NodeId};
 use crate::building::check::{Finding, Kind, Notes, sorted};
 use crate::building::geometry::{self, Point, Segment};
 use crate::building::index::Index;
-use crate::building::{Building, Floor};
+use crate::building::{Building, Floor, Room};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
@@ -38,6 +38,8 @@ impl Default for Parameters {
 const ZERO_M: f64 = 0.01;
 /// A door leads into a room from whose outline it is no farther. **Units:** m.
 const DOOR_M: f64 = 0.4;
+/// A smaller outline is no room, but what a plan leaves between walls. **Units:** m².
+const LEAST_ROOM_M2: f64 = 0.1;
 /// A wall as near as this to a diagonal is in its way. **Units:** m.
 const CLEAR_M: f64 = 0.3;
 
@@ -296,7 +298,9 @@ impl Lint<'_> {
             .filter(|&id| pieces[self.graph.edge(id).from.index()] == 0)
             .map(|id| self.graph.ends(id))
             .collect();
-        for room in &floor.rooms {
+        // Slivers that a plan holds between walls are no rooms.
+        let roomy = |room: &&Room| geometry::area(&room.outline).abs() >= LEAST_ROOM_M2;
+        for room in floor.rooms.iter().filter(roomy) {
             let beside = |line: &Segment| {
                 let middle = geometry::between(line[0], line[1], 0.5);
                 geometry::sides(&room.outline)
@@ -338,7 +342,7 @@ fn wrapped(angle: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::building::check::Level;
-    use crate::building::{Connector, ConnectorKind, Door, Node, Room, WalkGraph};
+    use crate::building::{Connector, ConnectorKind, Door, Node, WalkGraph};
 
     /// Two rooms of 6 m by 6 m with a door between them, and a graph through it.
     fn house() -> Building {
@@ -427,6 +431,24 @@ mod tests {
                 (Kind::RoomOffGraph, "room 'right' has a door, but the graph does not lead into it".to_owned()),
             ]
         );
+    }
+
+    #[test]
+    fn a_sliver_beside_a_door_is_no_room() {
+        let mut building = house();
+        let sliver = |off: f64| Room {
+            name: "sliver".into(),
+            usage: None,
+            outline: vec![[6.1, 2.4], [6.1, 3.6], [6.1 + off, 3.6]],
+        };
+        building.floors[0].rooms.push(sliver(0.01));
+        assert_eq!(found(&building), []);
+        // One in which somebody may stand is told, where the graph does not lead into it.
+        building.floors[0].rooms.push(Room { name: "closet".into(), ..sliver(-0.5) });
+        building.graph.as_mut().unwrap().edges.drain(1..);
+        let told = found(&building);
+        assert!(told.iter().any(|(kind, what)| *kind == Kind::RoomOffGraph && what.contains("'closet'")), "{told:?}");
+        assert!(told.iter().all(|(_, what)| !what.contains("'sliver'")), "{told:?}");
     }
 
     #[test]
