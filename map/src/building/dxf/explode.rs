@@ -122,7 +122,14 @@ impl Work<'_> {
 
     fn insert(&mut self, insert: &Insert, map: Affine, layer: &str, depth: usize) -> Result<(), String> {
         let drawing = self.drawing;
-        let Some(block) = drawing.blocks.get(&insert.block) else { return Ok(()) };
+        let Some(block) = drawing.blocks.get(&insert.block) else {
+            let [x, y] = insert.place;
+            return Err(format!(
+                "block '{}' is put on layer {layer} at ({x}, {y}) of the drawing, but not defined: bind external references and \
+                 save the drawing anew, or take the block out",
+                insert.block
+            ));
+        };
         if depth >= DEEPEST {
             return Err(format!("block '{}' lies in more than {DEEPEST} blocks, or in itself", insert.block));
         }
@@ -279,6 +286,14 @@ mod tests {
         let Line::Straight([a, b]) = pieces[7].line else { panic!("no line") };
         // Mirrored, in the third column of the second row.
         assert!(near(a, [-3.0, 1.0]) && near(b, [-4.0, 1.0]), "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn a_block_that_is_not_defined_is_named_with_its_place() {
+        let entities = vec![entity("T\u{fc}ren", Shape::Insert(insert("Door90", [3.0, 4.5])))];
+        let told = explode(&Drawing { entities, ..Drawing::default() }, &Layers::default()).unwrap_err();
+        assert!(told.starts_with("block 'Door90' is put on layer T\u{fc}ren at (3, 4.5)"), "{told}");
+        assert!(told.contains("bind external references"), "{told}");
     }
 
     #[test]
