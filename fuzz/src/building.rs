@@ -115,7 +115,7 @@ fn house(georeference: Georeference) -> Building {
         outlines: vec![(0, steps.clone()), (1, steps)],
         way: vec![[6.5, 3.0, 0.0], [6.5, 6.0, 3.5]],
     };
-    let entrances = vec![Entrance { name: "main".into(), floor: 0, place: [8.0, 1.0] }];
+    let entrances = vec![Entrance { name: "main".into(), floor: 0, place: [8.0, 1.0], beacon: None }];
     let (floors, connectors) = (vec![floor(0), floor(1)], vec![stairs]);
     Building { name: "House".into(), georeference, floors, connectors, entrances, ..Building::default() }
 }

@@ -156,6 +156,47 @@ fn a_recorded_walk_is_matched_from_a_known_start_and_from_anywhere() {
     assert!(refused(home.path(), &wrong).contains("aside_m = -1: expected 0.05 to 20"));
 }
 
+#[test]
+fn a_walk_begins_at_the_entrance_whose_beacon_is_loud() {
+    let home = house();
+    let folder = home.path();
+    // The beacon of the main entrance gets its id.
+    let house = std::fs::read_to_string(folder.join("twin.geojson")).unwrap();
+    let mut house: serde_json::Value = serde_json::from_str(&house).unwrap();
+    let features = house["features"].as_array_mut().unwrap();
+    let entrance = features.iter_mut().find(|feature| feature["properties"]["kind"] == "entrance").unwrap();
+    entrance["properties"]["beacon"] = "40".into();
+    std::fs::write(folder.join("house.geojson"), house.to_string()).unwrap();
+    said(folder, &["simulate", "--building", "twin.geojson", "--route", "hall,W02", "--out", "walk.mcap"]);
+    let heard = |lines: &str| std::fs::write(folder.join("heard.jsonl"), lines).unwrap();
+    let begin = ["graph", "walk.mcap", "--building", "house.geojson", "--start", "beacon"];
+    let by_beacon = [&begin[..], &["--beacons", "heard.jsonl", "--method", "documented", "--explain"]].concat();
+    heard(
+        "{\"time_us\":0,\"beacon\":\"40\",\"rssi_dbm\":-71}\n{\"time_us\":1000000,\"beacon\":\"40\",\"rssi_dbm\":-52}\n",
+    );
+    let told = said(folder, &by_beacon);
+    assert!(told.starts_with("begins at entrance 'main' of floor 0 after 1.0 s: beacon '40' with -52 dBm"), "{told}");
+    // From the entrance at (26, 0.3) into the building.
+    let first = told.lines().find(|line| line.starts_with("step ")).unwrap();
+    assert!(first.contains("(26.0"), "{first}");
+    // The matcher begins there, too.
+    let matched = said(folder, &[&begin[..], &["--beacons", "heard.jsonl"]].concat());
+    assert!(matched.starts_with("begins at entrance 'main'") && matched.contains("place at the end"), "{matched}");
+    // A threshold that nothing exceeds, a beacon that nobody knows, and what is missing.
+    let quiet = [&by_beacon[..], &["--beacon-dbm", "-50"]].concat();
+    assert!(refused(folder, &quiet).contains("louder than -50 dBm: the loudest was '40' with -52 dBm"));
+    heard("{\"time_us\":0,\"beacon\":\"7\",\"rssi_dbm\":-40}\n");
+    assert!(refused(folder, &by_beacon).contains("heard '7', and the entrances have '40'"));
+    heard("{\"time_us\":0,\"beacon\":\"40\"}\n");
+    assert!(refused(folder, &by_beacon).contains("heard.jsonl, line 1: missing field `rssi_dbm`"));
+    assert!(refused(folder, &begin).contains("expected --beacons FILE"));
+    let unknown = ["graph", "walk.mcap", "--building", "twin.geojson", "--start", "beacon", "--beacons", "heard.jsonl"];
+    heard("{\"time_us\":0,\"beacon\":\"40\",\"rssi_dbm\":-40}\n");
+    assert!(refused(folder, &unknown).contains("no entrance of the building has a beacon"));
+    let other = ["graph", "walk.mcap", "--building", "twin.geojson", "--start", "main", "--beacons", "heard.jsonl"];
+    assert!(refused(folder, &other).contains("--beacons is for --start beacon"));
+}
+
 /// So many walks in each building; those of the whole suite take some minutes.
 const FEW: &str = "4";
 
@@ -188,13 +229,13 @@ fn the_rooms_of_the_university_are_reached_and_no_edge_leads_through_a_wall() {
     let errors = found.iter().filter(|finding| finding.level == Level::Error);
     let errors: Vec<_> = errors.filter(|finding| finding.kind != Kind::SeparatePiece).collect();
     assert!(errors.iter().all(|finding| finding.kind == Kind::RoomOffGraph), "{errors:#?}");
-    // Shafts to which no way leads at all are told by the check of the building, too. Of some 400 rooms five more have a door
-    // that the graph does not lead through.
+    // Shafts to which no way leads at all are told by the check of the building, too. Of some 400 rooms two more are off the
+    // graph: E 117, whose only door leads out of doors, and 1 013, through whose door to a hall no edge is laid.
     let place = |finding: &Finding| (finding.floor, finding.room.clone());
     let plan = check(&building);
     let closed: Vec<_> = plan.iter().filter(|finding| finding.kind == Kind::UnreachableRoom).map(place).collect();
     let off: Vec<_> = errors.iter().map(|finding| place(finding)).filter(|room| !closed.contains(room)).collect();
-    assert!(off.len() <= 5, "{off:?}");
+    assert!(off.len() <= 2, "{off:?}");
     // Walls once more without the lint's own means.
     let graph = Graph::of(&building).unwrap();
     for floor in &building.floors {

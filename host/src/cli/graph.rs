@@ -1,5 +1,6 @@
 //! `sohle graph`: a recorded walk on the walk graph of a building, with several hypotheses or as the graph document does it.
 
+use super::beacons;
 use super::fixes::{self, Source};
 use super::table::Table;
 use super::{Error, print};
@@ -17,7 +18,7 @@ use crate::graph::tracker::{Case, Decision, Floors, Parameters, SearchBy, Tracke
 use crate::particle::Start;
 use crate::recording::Recording;
 use crate::track::Track;
-use crate::{follow, particle, phone, recording, toml_file};
+use crate::{particle, phone, recording, toml_file};
 use std::path::{Path, PathBuf};
 
 /// Follows a recorded walk on the walk graph of a building
@@ -31,6 +32,7 @@ use std::path::{Path, PathBuf};
     sohle graph eight_walk/ --building 4OG.geojson --start anywhere --explain\n  \
     sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164 --method documented --explain\n  \
     sohle graph eight_walk/ --building 4OG.geojson --start 4,76.7,33.4,-164 --method documented --search map-matching\n  \
+    sohle graph walk.mcap --building house.geojson --start beacon --beacons heard.jsonl --barometer\n  \
     sohle graph walk.mcap --building buildings/twin.geojson --start 0,26,0.3,90 --barometer --out way\n  \
     sohle graph walk.mcap --building buildings/twin.geojson --start anywhere --barometer --fixes positions.jsonl")]
 pub struct Args {
@@ -40,9 +42,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     building: PathBuf,
     /// Where the walk begins, and into which direction: FLOOR,X,Y,HEADING_DEG. The matcher takes 'anywhere', 'entrances', the
-    /// name of a room and FLOOR,X,Y too
+    /// name of a room and FLOOR,X,Y too. 'beacon': at the entrance whose beacon is loud enough first, from then on, into the building
     #[arg(long, value_name = "WHERE", allow_hyphen_values = true)]
     start: String,
+    #[command(flatten)]
+    beacons: beacons::Beacons,
     /// Who follows
     #[arg(long, value_enum, default_value_t = Method::Matcher)]
     method: Method,
@@ -111,7 +115,8 @@ fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, 
         sigma_m: f64::from(place.sigma_m),
         heading: place.heading.map(|(heading, sigma)| (f64::from(heading), f64::from(sigma))),
     };
-    let begin = match follow::start::parse(building, &args.start)? {
+    let (begin, since) = beacons::start(&args.beacons, &args.start, building, Clock::of_past(walk.began_us()))?;
+    let begin = match begin {
         Start::At(places) => matcher::Start::At(places.into_iter().map(place).collect()),
         Start::Anywhere => matcher::Start::Anywhere,
     };
@@ -123,7 +128,7 @@ fn matched(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i32, 
     let said = (args.fixes.as_ref(), &walk.fixes[..]);
     let mut incoming = fixes::incoming(said, Some(building), Clock::of_past(walk.began_us()), &settings, false)?;
     let (mut places, mut located) = (Vec::new(), None);
-    for step in &walk.steps {
+    for step in walk.steps.iter().filter(|step| step.stance_end > since) {
         if let Some(incoming) = &mut incoming {
             incoming.step(step, |observation| {
                 matcher.sight(&sight(observation, &Outliers::default()), observation.time);
@@ -178,13 +183,14 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
     if let Some(search) = args.search {
         parameters.search = search;
     }
-    let place = match follow::start::parse(building, &args.start)? {
+    let (begin, since) = beacons::start(&args.beacons, &args.start, building, Clock::of_past(walk.began_us()))?;
+    let place = match begin {
         Start::At(places) => places.into_iter().next().and_then(|place| Some((place, place.heading?))),
         Start::Anywhere => None,
     };
     let Some((place, (heading, _))) = place else {
         return Err(Error::new(format!(
-            "--start {}: expected FLOOR,X,Y,HEADING_DEG (or --method matcher, which needs less)",
+            "--start {}: expected FLOOR,X,Y,HEADING_DEG, or a beacon at an entrance with a door (or --method matcher, which needs less)",
             args.start
         )));
     };
@@ -200,7 +206,7 @@ fn documented(args: &Args, building: &Building, graph: &Graph) -> Result<Vec<(i3
         tracker = tracker.with_barometer(floors);
     }
     let mut decisions = Vec::new();
-    for step in &walk.steps {
+    for step in walk.steps.iter().filter(|step| step.stance_end > since) {
         let rise = f64::from(step.displacement.z);
         let decision = tracker.step(f64::from(step.turn), f64::from(step.length()), rise);
         if args.explain {

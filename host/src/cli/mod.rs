@@ -5,7 +5,8 @@
 //! the standard error output, and an error ends the program with one line and exit code 1 (2 if the command line itself
 //! was wrong).
 
-pub mod bench;
+pub mod beacons;
+mod bench;
 pub mod building;
 pub mod calibrate;
 pub mod command;

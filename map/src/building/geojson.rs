@@ -7,7 +7,7 @@
 //! ```
 //! Every feature has the properties `kind` and `floor`: `wall` (lines), `door` (a line of two points), `room` (a polygon,
 //! with `name` and `usage`), `stairs`, `ramp`, `elevator` (a polygon for each floor; those of one `name` belong together; the
-//! first may have `way`, a list of x, y, z in metres), `entrance` (a point, with `name`), `path` (lines of the walk graph: a
+//! first may have `way`, a list of x, y, z in metres), `entrance` (a point, with `name` and maybe `beacon`), `path` (lines of the walk graph: a
 //! node is where a line begins, bends or ends, a third coordinate its height in metres; those that climb have `to_floor`).
 //! Coordinates are longitude and
 //! latitude; of a building that is somewhere (`"kind": "local"`) they are metres, and `crs_note` says so.
@@ -125,7 +125,8 @@ fn add(building: &mut Building, feature: &RawFeature) -> Result<(), String> {
         "entrance" => match feature.points[..] {
             [place] => {
                 let name = name.ok_or("an entrance needs a 'name'")?;
-                building.entrances.push(Entrance { name, floor: number, place });
+                let beacon = feature.text("beacon");
+                building.entrances.push(Entrance { name, floor: number, place, beacon });
             }
             _ => return Err("an entrance is a point".to_owned()),
         },
@@ -257,7 +258,11 @@ pub fn write(building: &Building) -> Result<String, Error> {
     }
     for entrance in &building.entrances {
         let geometry = json!({"type": "Point", "coordinates": place.point(entrance.place)?});
-        features.push(feature("entrance", entrance.floor, Some(&entrance.name), geometry));
+        let mut point = feature("entrance", entrance.floor, Some(&entrance.name), geometry);
+        if let Some(beacon) = &entrance.beacon {
+            point["properties"]["beacon"] = json!(beacon);
+        }
+        features.push(point);
     }
     if let Some(graph) = &building.graph {
         features.extend(place.paths(graph)?);
@@ -390,7 +395,7 @@ mod tests {
                 connector("s1", ConnectorKind::Stairs, vec![[0.5, 0.5, 0.0], [0.5, 4.0, 3.5]]),
                 connector("e1", ConnectorKind::Elevator, Vec::new()),
             ],
-            entrances: vec![Entrance { name: "main".into(), floor: 0, place: [0.0, 1.5] }],
+            entrances: vec![Entrance { name: "main".into(), floor: 0, place: [0.0, 1.5], beacon: Some("40".into()) }],
             graph: Some(graph),
         }
         .assembled()
@@ -437,7 +442,7 @@ mod tests {
                 let node =
                     |(floor, place, height)| Node { floor: lowest + floor, place, height_m: f64::from(height) / 1e3 };
                 let graph = WalkGraph { nodes: nodes.into_iter().map(node).collect(), edges };
-                let entrances = vec![Entrance { name: "main".into(), floor: lowest, place: entrance }];
+                let entrances = vec![Entrance { name: "main".into(), floor: lowest, place: entrance, beacon: None }];
                 let graph = drawn.then_some(graph);
                 Building { name: "any".into(), floors, entrances, graph, ..Building::default() }.assembled().unwrap()
             },

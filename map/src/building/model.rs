@@ -107,6 +107,8 @@ pub struct Entrance {
     pub floor: i32,
     /// Where.
     pub place: Point,
+    /// Id of the beacon above its door, if there is one.
+    pub beacon: Option<String>,
 }
 
 /// The ways that people take: places, and which of them one can walk between, in both directions.

@@ -91,6 +91,7 @@ pub(super) fn assert_same(read: &Building, written: &Building, offset: Point, to
     assert_eq!(read.connectors.len(), written.connectors.len());
     assert_eq!(read.entrances.len(), written.entrances.len());
     for (read, written) in read.entrances.iter().zip(&written.entrances) {
+        assert_eq!(read.beacon, written.beacon);
         assert_eq!(read.floor, written.floor);
         // Just inside: which step behind the door is the reader's to choose.
         assert!(geometry::distance(read.place, written.place) < 0.5);

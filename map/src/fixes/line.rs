@@ -68,21 +68,26 @@ struct Line {
     floor: Option<i32>,
 }
 
+/// When something was measured, by the clock of the steps. **Units:** us.
+pub(super) fn moment(time_us: Option<i64>, unix_us: Option<i64>, clock: Clock) -> Result<i64, LineError> {
+    match (time_us, unix_us, clock.epoch_us, clock.now) {
+        (Some(time), None, ..) => Ok(time),
+        (None, Some(date), Some(epoch), _) => Ok(date.saturating_sub(epoch)),
+        (None, Some(_), None, _) => {
+            Err(LineError::Members("unix_us, but the date of the steps is not known: expected time_us"))
+        }
+        (None, None, _, Some(now)) => Ok(now.0),
+        _ => Err(LineError::Members("expected one of time_us and unix_us")),
+    }
+}
+
 /// Reads a line.
 ///
 /// # Errors
 /// For what is no JSON, members that are not known, missing or contradict each other, and frames without a name.
 pub fn parse(text: &str, clock: Clock) -> Result<Fix, LineError> {
     let line: Line = serde_json::from_str(text)?;
-    let time = match (line.time_us, line.unix_us, clock.epoch_us, clock.now) {
-        (Some(time), None, ..) => time,
-        (None, Some(date), Some(epoch), _) => date.saturating_sub(epoch),
-        (None, Some(_), None, _) => {
-            return Err(LineError::Members("unix_us, but the date of the steps is not known: expected time_us"));
-        }
-        (None, None, _, Some(now)) => now.0,
-        _ => return Err(LineError::Members("expected one of time_us and unix_us")),
-    };
+    let time = moment(line.time_us, line.unix_us, clock)?;
     let arrived = match (clock.now, line.arrived_us, line.unix_us, clock.epoch_us) {
         (Some(now), ..) => now.0,
         (None, Some(arrived), None, _) => arrived,

@@ -8,7 +8,7 @@
 //! [`Method`] and takes the same steps and observations.
 //!
 //! [`line`](mod@line) is a fix as a line of JSON, [`intake`] where such lines come in and are counted, [`fusion`] what puts them
-//! together with the steps as both come.
+//! together with the steps as both come. [`beacon`] tells through which entrance a walk begins.
 //!
 //! # Frame
 //! The building's: x east, y north, in metres; directions counter-clockwise from east.
@@ -18,6 +18,7 @@
 
 pub mod adjustment;
 mod aligner;
+pub mod beacon;
 mod beginning;
 pub mod extended;
 pub mod fix;

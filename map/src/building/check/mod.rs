@@ -212,7 +212,8 @@ mod tests {
             rooms: vec![room("left", rectangle(0.0, 0.0, 4.0, 4.0)), room("right", rectangle(4.0, 0.0, 8.0, 4.0))],
             ..Floor::default()
         };
-        let entrances = vec![crate::building::Entrance { name: "main".into(), floor: 0, place: [0.5, 1.5] }];
+        let entrances =
+            vec![crate::building::Entrance { name: "main".into(), floor: 0, place: [0.5, 1.5], beacon: None }];
         Building { floors: vec![floor], entrances, ..Building::default() }
     }
 

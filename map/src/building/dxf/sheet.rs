@@ -144,6 +144,7 @@ impl Sheet {
                 name: name.map_or_else(|| "entrance".to_owned(), |(_, name)| name.clone()),
                 floor: floor.number,
                 place,
+                beacon: None,
             }
         });
         let entrances = entrances.collect();

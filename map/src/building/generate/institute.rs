@@ -25,7 +25,7 @@ const LOBBY: (Point, Point) = ([14.0, NORTH], [MAIN, NORTH + STAIRS_M[1]]);
 /// Never; the tests make it.
 pub fn institute() -> Building {
     let cabin = elevator("elevator-1", CABIN.0, CABIN.1, 3);
-    let entrances = vec![Entrance { name: "main".to_owned(), floor: 0, place: [15.5, 0.3] }];
+    let entrances = vec![Entrance { name: "main".to_owned(), floor: 0, place: [15.5, 0.3], beacon: None }];
     made(Building {
         name: "Institute".to_owned(),
         floors: [ground(), first(), second()].map(|drawing| drawing.floor).into(),

@@ -69,7 +69,7 @@ pub fn twin(floors: i32) -> Building {
             stairs("stairs-E", east, NORTH, floors, Side::East),
             elevator("elevator-1", cabin.0, cabin.1, floors),
         ],
-        entrances: vec![Entrance { name: "main".to_owned(), floor: 0, place: [WING + HALL / 2.0, 0.3] }],
+        entrances: vec![Entrance { name: "main".to_owned(), floor: 0, place: [WING + HALL / 2.0, 0.3], beacon: None }],
         ..Building::default()
     };
     made(building)
@@ -160,7 +160,7 @@ pub fn offices(name: &str, floors_wanted: i32, strips: usize, long: f64, seed: u
     for (index, (low, high)) in cabins.into_iter().enumerate() {
         connectors.push(elevator(&format!("elevator-{}", index + 1), low, high, floors_wanted));
     }
-    let entrances = vec![Entrance { name: "main".to_owned(), floor: 0, place: [across[0] + 3.5, 0.3] }];
+    let entrances = vec![Entrance { name: "main".to_owned(), floor: 0, place: [across[0] + 3.5, 0.3], beacon: None }];
     made(Building { name: name.to_owned(), floors, connectors, entrances, ..Building::default() })
 }
 

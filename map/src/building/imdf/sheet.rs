@@ -153,6 +153,7 @@ impl Sheet {
             name: name.clone(),
             floor: floor.number,
             place: opening::inside_of(line, inside),
+            beacon: None,
         };
         let entrances = self.entrances.iter().map(entrance).collect();
         Ok((floor, entrances))

@@ -124,7 +124,7 @@ impl Sheet {
                         || self.shells.iter().any(|shell| geometry::contains(shell, point))
                 };
                 let place = opening::inside_of(&line, inside);
-                entrances.push(Entrance { name, floor: self.floor.number, place });
+                entrances.push(Entrance { name, floor: self.floor.number, place, beacon: None });
             }
             self.floor.doors.push(Door { line, name: door.name });
         }
