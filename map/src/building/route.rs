@@ -6,6 +6,7 @@ use super::error::Error;
 use super::geometry::{self, Point};
 use super::model::{Building, Connector, ConnectorKind, Floor};
 use pathfinding::prelude::astar;
+use std::f64::consts::{FRAC_PI_3, TAU};
 
 /// Side of a cell. **Units:** m.
 const CELL_M: f64 = 0.15;
@@ -19,6 +20,8 @@ const DISLIKE: u32 = 2;
 const MIDDLE_M: f64 = 1.5;
 /// And turns so far beside where the straightest way does at most. **Units:** m.
 const ASIDE_M: f64 = 1.2;
+/// But not for the price of turning so much more: nobody walks a loop for it. **Units:** rad.
+const DETOUR: f64 = FRAC_PI_3;
 /// Length of a straight and of a diagonal move, in hundredths of a cell.
 const STRAIGHT: u32 = 100;
 const DIAGONAL: u32 = 141;
@@ -375,6 +378,13 @@ impl<'a> Free<'a> {
         const PARTS: i32 = 16;
         for at in 1..points.len().saturating_sub(1) {
             let [before, here, after] = [points[at - 1], points[at], points[at + 1]];
+            let first = at.saturating_sub(2);
+            let mut around = points[first..points.len().min(at + 3)].to_vec();
+            let turned = turning(&around);
+            let mut more = |place: Point| {
+                around[at - first] = place;
+                turning(&around) - turned
+            };
             let mut best = (self.room(here), here);
             for other in [before, after] {
                 let long = geometry::distance(other, here);
@@ -382,7 +392,7 @@ impl<'a> Free<'a> {
                     let off_m = ASIDE_M * f64::from(part) / f64::from(PARTS);
                     let place = geometry::between(other, here, 1.0 + off_m / long);
                     let fits = off_m > -long && self.is_free([before, place]) && self.is_free([place, after]);
-                    if fits && self.room(place) > best.0 + 1e-6 {
+                    if fits && self.room(place) > best.0 + 1e-6 && more(place) < DETOUR {
                         best = (self.room(place), place);
                     }
                 }
@@ -415,10 +425,22 @@ impl<'a> Free<'a> {
     }
 }
 
+/// How much somebody turns on a way, to the left and to the right. **Units:** rad.
+fn turning(points: &[Point]) -> f64 {
+    let direction = |pair: &[Point]| (pair[1][1] - pair[0][1]).atan2(pair[1][0] - pair[0][0]);
+    let directions: Vec<f64> = points.windows(2).map(direction).collect();
+    let turn = |pair: &[f64]| {
+        let turn = (pair[1] - pair[0]).abs();
+        turn.min(TAU - turn)
+    };
+    directions.windows(2).map(turn).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::generate;
     use super::*;
+    use std::f64::consts::PI;
 
     /// Whether a way goes through a wall.
     fn crosses(floor: &Floor, points: &[Point]) -> bool {
@@ -476,6 +498,35 @@ mod tests {
         assert_eq!(straight.len(), middle.len());
         let (straight, middle) = (off(straight), off(middle));
         assert!(middle < 0.55 && straight > 0.8, "{middle} {straight}");
+    }
+
+    #[test]
+    fn nobody_walks_a_loop_to_keep_to_the_middle() {
+        let building = generate::twin(2);
+        let names: Vec<String> = building
+            .floors
+            .iter()
+            .flat_map(|floor| floor.rooms.iter().map(|room| format!("{}/{}", floor.name, room.name)))
+            .collect();
+        let turned = |planner: &Planner<'_>, stops: &[&str]| -> Option<f64> {
+            let pieces = planner.plan(stops).ok()?;
+            let walked = pieces.iter().map(|piece| match piece {
+                Piece::Walk { points, .. } => turning(points),
+                _ => 0.0,
+            });
+            Some(walked.sum())
+        };
+        let [straight, middle] = [Manner::Straight, Manner::Middle].map(|manner| Planner::with(&building, manner));
+        let mut ways = 0;
+        for (at, from) in names.iter().enumerate() {
+            let stops = [from.as_str(), &names[(at * 7 + 11) % names.len()]];
+            let Some(least) = turned(&straight, &stops) else { continue };
+            ways += 1;
+            let more = turned(&middle, &stops).unwrap() - least;
+            // A loop turns by 2 pi.
+            assert!(more < PI, "{stops:?}: {more}");
+        }
+        assert!(ways > 30, "{ways}");
     }
 
     #[test]
