@@ -7,6 +7,7 @@
 
 use super::error::Error;
 use super::model::Graph;
+use crate::building::geometry::wrapped;
 use crate::building::{Building, Node, WalkGraph};
 use std::collections::BTreeMap;
 
@@ -281,11 +282,6 @@ fn check(row: &Row) -> Result<(), String> {
         ));
     }
     Ok(())
-}
-
-fn wrapped(angle: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
-    (angle + PI).rem_euclid(TAU) - PI
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::draw;
 use super::error::Error;
 use super::model::{EdgeId, EdgeKind, Graph, NodeId};
 use crate::building::check::{Finding, Kind, Notes, sorted};
-use crate::building::geometry::{self, Point, Segment};
+use crate::building::geometry::{self, Point, Segment, wrapped};
 use crate::building::index::Index;
 use crate::building::{Building, Floor, Room};
 use std::collections::{BTreeMap, BTreeSet};
@@ -332,10 +332,6 @@ fn blocked(walls: &Index<'_>, line: &Segment, reach: f64) -> bool {
             || wall.iter().any(|&end| near(line, end))
             || line.iter().any(|&end| near(wall, end))
     })
-}
-
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(2.0 * PI) - PI
 }
 
 #[cfg(test)]

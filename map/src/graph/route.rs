@@ -6,7 +6,7 @@
 use super::error::Error;
 use super::model::{EdgeId, EdgeKind, Graph, NodeId};
 use super::paths::{self, Path, plan_length};
-use crate::building::geometry::{self, Point};
+use crate::building::geometry::{self, Point, wrapped};
 use crate::building::{Building, Connector, Floor};
 use std::f64::consts::PI;
 
@@ -341,10 +341,6 @@ impl Guide<'_> {
         let nearest = self.building.floors.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
         nearest.map_or(0, |floor| floor.number)
     }
-}
-
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(2.0 * PI) - PI
 }
 
 #[cfg(test)]

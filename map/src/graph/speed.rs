@@ -3,10 +3,7 @@
 use super::matcher::{Estimate, Matcher, Parameters, Place, Start};
 use super::{Error, Graph};
 use crate::building::{Node, Point, WalkGraph};
-use crate::phone::{self, tracker::covariance};
-use nalgebra::Vector3;
-use sohle_shared::sample::ClippedSamples;
-use sohle_shared::step::{FloorMode, Step, StepQuality};
+use crate::phone::{self, Measured};
 use sohle_shared::time::Micros;
 use std::f64::consts::FRAC_PI_2;
 
@@ -67,8 +64,8 @@ pub struct Work {
 }
 
 impl Work {
-    /// Corridors with at least so many directed edges, or with the smallest square of them; `known` tells whether the matcher
-    /// knows the start.
+    /// The smallest square of corridors that has at least so many directed edges; `known` tells whether the matcher knows the
+    /// start.
     ///
     /// # Errors
     /// More than can be numbered.
@@ -101,20 +98,9 @@ impl Work {
         self.place = [self.place[0] + length * cos, self.place[1] + length * sin];
         let time = Micros(i64::from(self.count) * STEP_US);
         let settings = phone::Parameters::default();
-        let (sin, cos) = turn.sin_cos();
-        let step = Step {
-            index: self.count,
-            stance_start: time,
-            stance_end: time,
-            displacement: Vector3::new(length * cos, length * sin, 0.0).cast(),
-            turn: turn as f32,
-            covariance: covariance(&settings, length, settings.length_part, turn, false).cast(),
-            mode: FloorMode::Level,
-            quality: StepQuality::default(),
-            clipped: ClippedSamples::default(),
-        };
+        let measured = Measured { index: self.count, time, length, part: settings.length_part, turn, rise: None };
         self.count += 1;
-        self.matcher.step(&step)
+        self.matcher.step(&measured.step(&settings))
     }
 
     /// Where the walk is in truth. **Units:** m; **Frame:** building.

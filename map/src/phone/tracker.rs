@@ -5,20 +5,15 @@ use super::barometer::{self, Barometer};
 use super::detector::{self, StepDetector};
 use super::length::Length;
 use super::sample::PhoneSample;
-use nalgebra::{Matrix4, Vector3};
-use sohle_shared::sample::ClippedSamples;
-use sohle_shared::step::{FloorMode, Step, StepQuality};
+use super::step::Measured;
+use crate::building::geometry::wrapped;
+use sohle_shared::step::{Step, StepQuality};
 use sohle_shared::time::Micros;
-use std::f64::consts::{PI, TAU};
 
 /// Samples further apart leave a gap. **Units:** s.
 const GAP_S: f64 = 0.5;
 /// Standard gravity. **Units:** m/s².
 const GRAVITY: f64 = 9.806_65;
-/// Nothing is known better than that (standard deviation). **Units:** m.
-const LEAST_SIGMA_M: f64 = 0.02;
-/// How little is known of a height that nothing measures (standard deviation). **Units:** m.
-const UNKNOWN_HEIGHT_M: f64 = 10.0;
 
 /// Settings of [`PhoneTracker`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -146,42 +141,12 @@ impl PhoneTracker {
             // Of the first step of all nobody knows where in it the recording began.
             (0.5 * p.length.of(p.person_m, f64::INFINITY, bounce), 0.5)
         };
-        let (sin, cos) = turn.sin_cos();
-        let covariance = covariance(p, length, part, turn, rise.is_some());
-        let step = Step {
-            index: self.count,
-            stance_start: time,
-            stance_end: time,
-            displacement: Vector3::new(length * cos, length * sin, rise.unwrap_or(0.0)).cast(),
-            turn: turn as f32,
-            covariance: covariance.cast(),
-            mode: FloorMode::Level,
-            quality: StepQuality { gap: std::mem::take(&mut self.gap), ..StepQuality::default() },
-            clipped: ClippedSamples::default(),
-        };
+        let step = Measured { index: self.count, time, length, part, turn, rise }.step(p);
+        let quality = StepQuality { gap: std::mem::take(&mut self.gap), ..step.quality };
         self.previous = Some((time, heading, height));
         self.count = self.count.wrapping_add(1);
-        step
+        Step { quality, ..step }
     }
-}
-
-/// How wrong a step may be (x, y, z, turn) that is so long, with a part of it unsure, and leads so far aside of the one
-/// before; and whether its rise was measured. **Units:** m, rad; **Frame:** heading frame of the previous step.
-pub fn covariance(p: &Parameters, length: f64, part: f64, turn: f64, measured: bool) -> Matrix4<f64> {
-    let along = (part * length).powi(2) + LEAST_SIGMA_M * LEAST_SIGMA_M;
-    let aside = p.aside_m * p.aside_m;
-    let tall = if measured { p.barometer.sigma_m } else { UNKNOWN_HEIGHT_M }.powi(2);
-    let turned = p.turn_sigma * p.turn_sigma + (p.turn_part * turn).powi(2);
-    // Along and aside of the new direction, seen from the old one.
-    let (sin, cos) = turn.sin_cos();
-    let (xx, yy) = (along * cos * cos + aside * sin * sin, along * sin * sin + aside * cos * cos);
-    let xy = (along - aside) * sin * cos;
-    Matrix4::new(
-        xx, xy, 0.0, 0.0, //
-        xy, yy, 0.0, 0.0, //
-        0.0, 0.0, tall, 0.0, //
-        0.0, 0.0, 0.0, turned,
-    )
 }
 
 /// All steps of a recording.
@@ -190,13 +155,11 @@ pub fn steps(samples: &[PhoneSample], parameters: &Parameters) -> Vec<Step> {
     samples.iter().filter_map(|sample| tracker.push(sample)).collect()
 }
 
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(TAU) - PI
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
+    use std::f64::consts::{PI, TAU};
 
     /// Ten seconds straight on at 1.8 steps a second, a quarter turn to the left, and ten seconds more.
     fn walk() -> Vec<Step> {

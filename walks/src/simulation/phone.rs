@@ -8,15 +8,13 @@
 //! Graph, 4.1, 6.3, 6.4 and 6.11.
 
 use super::random::{Purpose, Random};
+use crate::building::geometry::wrapped;
 use crate::building::route::Piece;
 use crate::building::{Building, Error};
-use crate::phone;
-use crate::phone::tracker::covariance;
+use crate::phone::{self, Measured};
 use nalgebra::Vector3;
-use sohle_shared::sample::ClippedSamples;
-use sohle_shared::step::{FloorMode, Step, StepQuality};
+use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
-use std::f64::consts::{PI, TAU};
 
 /// The length that the phone takes every step on the level for (Graph, 6.6), and on stairs, of which the barometer tells
 /// (Graph, 6.11). **Units:** m.
@@ -337,24 +335,11 @@ impl<'a> Walker<'a> {
     }
 
     fn tell(&mut self, (length, turn, rise): (f64, f64, f64), seconds: f64) {
-        let (sin, cos) = turn.sin_cos();
+        let index = self.walk.steps.len() as u32;
         let time = Micros((seconds * 1e6).round() as i64);
-        self.walk.steps.push(Step {
-            index: self.walk.steps.len() as u32,
-            stance_start: time,
-            stance_end: time,
-            displacement: Vector3::new(length * cos, length * sin, rise).cast(),
-            turn: turn as f32,
-            covariance: covariance(&self.settings, length, self.settings.length_part, turn, true).cast(),
-            mode: FloorMode::Level,
-            quality: StepQuality::default(),
-            clipped: ClippedSamples::default(),
-        });
+        let measured = Measured { index, time, length, part: self.settings.length_part, turn, rise: Some(rise) };
+        self.walk.steps.push(measured.step(&self.settings));
     }
-}
-
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(TAU) - PI
 }
 
 #[cfg(test)]

@@ -24,6 +24,7 @@ pub use start::start;
 pub use variance::Variance;
 
 use super::{EdgeId, EdgeKind, Graph, NodeId};
+use crate::building::geometry::wrapped;
 use std::f64::consts::PI;
 
 /// A shorter edge has no direction. **Units:** m.
@@ -374,8 +375,4 @@ enum Moved {
     On,
     /// It would be so far along it, beyond its end. **Units:** m.
     Beyond(f64),
-}
-
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(2.0 * PI) - PI
 }

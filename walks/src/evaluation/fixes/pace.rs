@@ -1,9 +1,7 @@
-//! A walk of hours, step by step and position by position, to be timed.
+//! A walk of hours with a phone, step by step and position by position, to be timed.
 
 use crate::fixes::{Method, Observation};
-use nalgebra::{Matrix4, Vector3, Vector4};
-use sohle_shared::sample::ClippedSamples;
-use sohle_shared::step::{FloorMode, Step, StepQuality};
+use crate::phone::{self, Measured};
 use sohle_shared::time::Micros;
 
 /// From step to step. **Units:** us.
@@ -25,22 +23,12 @@ impl Walker {
         let time = Micros(i64::from(self.count) * STEP_US);
         let turn = std::f64::consts::TAU / f64::from(ROUND);
         let length = 0.7;
-        let sigmas = Vector4::new(0.02_f32, 0.02, 0.02, 0.005);
-        let step = Step {
-            index: self.count,
-            stance_start: time,
-            stance_end: time,
-            displacement: Vector3::new(length as f32, 0.0, 0.0),
-            turn: turn as f32,
-            covariance: Matrix4::from_diagonal(&sigmas.component_mul(&sigmas)),
-            mode: FloorMode::Level,
-            quality: StepQuality::default(),
-            clipped: ClippedSamples::default(),
-        };
+        let settings = phone::Parameters::default();
+        let measured = Measured { index: self.count, time, length, part: settings.length_part, turn, rise: Some(0.0) };
+        self.heading += turn;
         let (sin, cos) = self.heading.sin_cos();
         self.place = [self.place[0] + length * cos, self.place[1] + length * sin];
-        self.heading += turn;
-        method.step(&step);
+        method.step(&measured.step(&settings));
         let noise = |part: f64| (f64::from(self.count) * part).sin();
         if told {
             let said = [self.place[0] + noise(12.9898), self.place[1] + noise(78.233)];
