@@ -10,7 +10,7 @@ use crate::export::{self, Named};
 use crate::fixes::Fix;
 use crate::fixes::line::Clock;
 use crate::fixes::smoother;
-use crate::phone::Parameters;
+use crate::phone::{self, Parameters};
 use crate::recording::{Recording, mcap};
 use crate::track::Track;
 use std::path::Path;
@@ -40,12 +40,13 @@ impl Replay<'_> {
         if self.compare {
             settings.push((Role::Documented, "documented", Parameters::documented()));
         }
-        let walks = settings.iter().map(|(_, _, parameters)| Recording::of_phone(self.file, parameters));
-        let walks: Vec<Recording> = walks.collect::<Result<_, _>>()?;
+        let name = self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let samples = phone::open::open(self.file)?.samples;
+        let walk = |parameters| Recording::of_phone_samples(name.clone(), &samples, parameters);
+        let walks: Vec<Recording> = settings.iter().map(|(_, _, parameters)| walk(parameters)).collect();
         let tracks: Vec<Track> = walks.iter().map(|walk| Track::of_steps(&walk.steps)).collect();
         let texts = settings.iter().map(|(_, _, parameters)| toml::to_string(parameters));
         let texts: Vec<String> = texts.collect::<Result<_, _>>()?;
-        let name = self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let folder = self.output.folder(&name);
         let mut table = Table::new("settings", &["steps", "distance, m"]);
         let mut picture = Picture::new(name);

@@ -2,7 +2,7 @@
 
 use super::{Recording, live};
 use crate::phone::sample::ReadError;
-use crate::phone::{self, Parameters};
+use crate::phone::{self, Parameters, PhoneSample};
 use std::path::Path;
 
 /// Metadata that tells who counted the steps.
@@ -15,10 +15,15 @@ impl Recording {
     /// # Errors
     /// When it cannot be read.
     pub fn of_phone(path: &Path, parameters: &Parameters) -> Result<Self, ReadError> {
-        let steps = phone::steps(&phone::open::open(path)?.samples, parameters);
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Self::of_phone_samples(name, &phone::open::open(path)?.samples, parameters))
+    }
+
+    /// The steps in what a phone measured, with these settings; its clock counts from 1970.
+    pub fn of_phone_samples(name: String, samples: &[PhoneSample], parameters: &Parameters) -> Self {
+        let steps = phone::steps(samples, parameters);
         let metadata = [(STEPS_OF, PHONE), (live::BEGAN, "0")].map(|(key, value)| (key.to_owned(), value.to_owned()));
-        Ok(Self { name, steps, metadata: metadata.into(), ..Self::default() })
+        Self { name, steps, metadata: metadata.into(), ..Self::default() }
     }
 
     /// Whether a phone counted its steps: their lengths are estimated, and every step is one of both feet.
