@@ -74,10 +74,12 @@ impl State {
         self.attitude.inverse() * Vector3::z()
     }
 
-    /// Whether every component of position and velocity is a number of at most `bound`. **Units:** m and m/s.
+    /// Whether position and velocity are made of numbers, and neither is longer than `bound`: so that no turn of the world
+    /// takes a component beyond it. **Units:** m and m/s.
     pub fn is_within(&self, bound: f32) -> bool {
-        let mut values = self.position.iter().chain(&self.velocity).chain(&self.attitude.coords);
-        values.all(|value| value.abs() <= bound)
+        let vectors = [&self.position, &self.velocity];
+        vectors.iter().all(|vector| vector.norm_squared() <= bound * bound)
+            && self.attitude.coords.iter().all(|value| value.is_finite())
     }
 }
 
