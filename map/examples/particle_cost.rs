@@ -4,13 +4,8 @@
 //! rooms along each side. The part runs within [`counted`], on one thread. Prints over how many particles it ran.
 
 use sohle_map::particle::speed::{Work, building};
+use sohle_shared::selftest::counted;
 use std::process::ExitCode;
-
-/// What callgrind counts: it is told the name of this function.
-#[inline(never)]
-fn counted<T>(work: impl FnOnce() -> T) -> T {
-    work()
-}
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();

@@ -8,17 +8,11 @@ use sohle_shared::filter::pivot::PivotFilter;
 use sohle_shared::filter::unscented::UnscentedFilter;
 use sohle_shared::preintegration::Preintegrator;
 use sohle_shared::sample::{AccelCorrected, GyroCorrected};
-use sohle_shared::selftest::{self, Walk};
+use sohle_shared::selftest::{self, Walk, counted};
 use sohle_shared::so3;
 use sohle_shared::step::FloorMode;
 use sohle_shared::tracker::{Parameters, Tracker};
 use std::process::ExitCode;
-
-/// What callgrind counts: it is told the name of this function.
-#[inline(never)]
-fn counted<T>(work: impl FnOnce() -> T) -> T {
-    work()
-}
 
 /// How often the part in question ran.
 struct Count(u32);

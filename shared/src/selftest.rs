@@ -14,6 +14,12 @@ use crate::tracker::{Output, Parameters, Tracker};
 use core::fmt;
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// Runs what callgrind is to count: it is told the name of this function (`cargo xtask bench`).
+#[inline(never)]
+pub fn counted<T>(work: impl FnOnce() -> T) -> T {
+    work()
+}
+
 /// A stance and the swing after it.
 struct Stride {
     /// **Units:** microseconds.
