@@ -1,10 +1,10 @@
 //! Recorded walks with a phone, as the command scores and follows them.
 
+use crate::command::program;
 use sohle::building::open::{Options, open};
 use sohle::evaluation::phone::{path::Path, walk};
 use sohle::phone;
 use sohle::recording::recordings_dir;
-use std::process::Command;
 
 /// Whether the recordings are there.
 fn recorded() -> bool {
@@ -15,22 +15,15 @@ fn recorded() -> bool {
     found
 }
 
-fn sohle() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sohle"));
-    // Whoever tests wants no windows.
-    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-    command
-}
-
 #[test]
 fn the_suite_prints_the_table_that_is_kept_and_reaches_its_goals() {
     if !recorded() {
         return;
     }
-    let output = sohle().args(["evaluate", "--suite", "phone"]).output().unwrap();
+    let output = program().args(["evaluate", "--suite", "phone"]).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     let printed = String::from_utf8(output.stdout).unwrap();
-    let kept = include_str!("../../tests/phone.txt");
+    let kept = include_str!("../../../tests/phone.txt");
     assert_eq!(printed, kept, "if that is meant: sohle evaluate --suite phone > tests/phone.txt");
     // The columns after the name: way, steps, documented (two), default (two), live, corrected, and from an unknown start.
     let row = |name: &str| -> Vec<f64> {
@@ -86,7 +79,7 @@ fn a_recording_of_a_phone_is_replayed_in_a_building() {
     let home = tempfile::tempdir().unwrap();
     let folder = recordings_dir().unwrap().join("hcu_hamburg");
     let replay = |more: &[&str]| {
-        let mut command = sohle();
+        let mut command = program();
         command.current_dir(home.path()).arg("replay").arg(folder.join("eight_walk")).args(["--out", "out"]);
         command.arg("--building").arg(folder.join("floorplans/4OG.geojson")).args(["--start", "4,76.7,33.4,-164"]);
         command.args(more).output().unwrap()
@@ -105,7 +98,7 @@ fn a_recording_of_a_phone_is_replayed_in_a_building() {
     let [x, y] = [0, 1].map(|axis| place[axis].as_f64().unwrap());
     assert!((x - 76.7).hypot(y - 33.4) < 1.5, "{place}");
     // What was written of it says the same again, by the settings of a phone.
-    let again = sohle()
+    let again = program()
         .current_dir(home.path())
         .args(["replay", "out/recording.mcap", "--out", "again", "--start", "4,76.7,33.4,-164", "--building"])
         .arg(folder.join("floorplans/4OG.geojson"))
@@ -122,7 +115,8 @@ fn a_recording_of_a_phone_is_replayed_in_a_building() {
 #[test]
 fn without_the_recordings_the_suite_says_so() {
     let home = tempfile::tempdir().unwrap();
-    let output = sohle().args(["evaluate", "--suite", "phone"]).env("SOHLE_RECORDINGS", home.path()).output().unwrap();
+    let output =
+        program().args(["evaluate", "--suite", "phone"]).env("SOHLE_RECORDINGS", home.path()).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(told.contains("hcu_hamburg/eight_walk is not there"), "{told}");

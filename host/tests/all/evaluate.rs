@@ -1,10 +1,11 @@
 //! `sohle evaluate` as a researcher uses it: recordings of one's own, a manifest, no Rust.
 #![expect(clippy::unwrap_used, reason = "the helpers of a test are part of it")]
 
+use crate::command::program;
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const STRIDES: usize = 20;
 const STANDING_S: f64 = 3.0;
@@ -109,7 +110,7 @@ figures = [{ metric = "rigid_rmse_m", statistic = "worst", must = 0.3, aim = 0.1
 
 fn evaluate(folder: &Path, manifest: &str, more: &[&str]) -> Output {
     std::fs::write(folder.join("manifest.toml"), manifest).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sohle"));
+    let mut command = program();
     command.arg("evaluate").arg("--manifest").arg(folder.join("manifest.toml")).args(more);
     command.env_remove("SOHLE_RECORDINGS").output().unwrap()
 }

@@ -1,40 +1,13 @@
 //! Steps with positions of other sources, from outside: the suite, good and bad lines, and what a recording keeps of them.
 
-use nalgebra::{Matrix4, Vector3};
+use crate::command::{self, program, said_and_warned, sohle};
 use sohle::recording::{Recording, mcap, recordings_dir};
-use sohle_shared::sample::ClippedSamples;
-use sohle_shared::step::{FloorMode, Step, StepQuality};
-use sohle_shared::time::Micros;
+use sohle_shared::step::Step;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn sohle(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sohle")).args(arguments).current_dir(folder).output().expect("it starts")
-}
-
-/// Runs a command that must succeed; what it says on both outputs.
-#[track_caller]
-fn said(folder: &Path, arguments: &[&str]) -> (String, String) {
-    let output = sohle(folder, arguments);
-    let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("it is text"));
-    assert!(output.status.success(), "{out}{err}");
-    (out, err)
-}
 
 /// Twenty strides of 1.2 m along the lower corridor of the twin, to the east from (4, 7.1) m.
 fn steps() -> Vec<Step> {
-    let step = |index: u32| Step {
-        index,
-        stance_start: Micros(i64::from(index) * 1_100_000),
-        stance_end: Micros(i64::from(index) * 1_100_000 + 400_000),
-        displacement: Vector3::new(if index == 0 { 0.0 } else { 1.2 }, 0.0, 0.0),
-        turn: 0.0,
-        covariance: Matrix4::identity() * 1e-4,
-        mode: FloorMode::Level,
-        quality: StepQuality::default(),
-        clipped: ClippedSamples::default(),
-    };
-    (0..=20).map(step).collect()
+    command::steps(20)
 }
 
 /// Where they lead, as a source tells it after each of them.
@@ -51,7 +24,7 @@ fn prepared(lines: &str) -> tempfile::TempDir {
     let home = tempfile::tempdir().expect("a folder");
     let recording = Recording { name: "walk".into(), steps: steps(), ..Recording::default() };
     mcap::write(&home.path().join("walk.mcap"), &recording).expect("it can be written");
-    said(home.path(), &["building", "generate", "twin", "twin.geojson"]);
+    said_and_warned(home.path(), &["building", "generate", "twin", "twin.geojson"]);
     std::fs::write(home.path().join("fixes.jsonl"), lines).expect("it can be written");
     home
 }
@@ -74,8 +47,8 @@ fn the_suite_prints_the_tables_that_are_kept_and_the_smoother_reaches_its_goals(
         return;
     }
     let home = tempfile::tempdir().expect("a folder");
-    let (printed, _) = said(home.path(), &["evaluate", "--suite", "fixes"]);
-    let kept = include_str!("../../tests/fixes.txt");
+    let (printed, _) = said_and_warned(home.path(), &["evaluate", "--suite", "fixes"]);
+    let kept = include_str!("../../../tests/fixes.txt");
     assert_eq!(printed, kept, "if that is meant: sohle evaluate --suite fixes > tests/fixes.txt");
     let rows = |table: &str, name: &str| -> Vec<Vec<String>> {
         let lines = kept.split(table).nth(1).expect("the table").lines().skip(1).take_while(|line| !line.is_empty());
@@ -115,7 +88,7 @@ fn the_suite_prints_the_tables_that_are_kept_and_the_smoother_reaches_its_goals(
 #[test]
 fn without_the_recordings_the_suite_says_so() {
     let home = tempfile::tempdir().expect("a folder");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sohle"));
+    let mut command = program();
     let output = command.args(["evaluate", "--suite", "fixes"]).env("SOHLE_RECORDINGS", home.path()).output();
     let output = output.expect("it starts");
     assert_eq!(output.status.code(), Some(1));
@@ -126,7 +99,7 @@ fn without_the_recordings_the_suite_says_so() {
 #[test]
 fn good_lines_place_a_walk_whose_start_nobody_knows() {
     let home = prepared(&positions("uwb", 0.0));
-    let (told, err) = said(home.path(), &["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
+    let (told, err) = said_and_warned(home.path(), &["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
     assert!(err.is_empty() && told.contains("positions of  all  taken"), "{told}{err}");
     for kind in ["said", "corrected"] {
         let [x, y] = last(home.path(), kind);
@@ -139,7 +112,7 @@ fn the_answer_is_that_of_the_plan_where_it_knows_one_and_of_the_positions_where_
     let home = prepared(&positions("uwb", 0.0));
     let last = |start: &str| -> serde_json::Value {
         let replay = ["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out", "--building", "twin.geojson"];
-        said(home.path(), &[&replay[..], &["--start", start]].concat());
+        said_and_warned(home.path(), &[&replay[..], &["--start", start]].concat());
         let lines = std::fs::read_to_string(home.path().join("out/places.jsonl")).expect("it was written");
         serde_json::from_str(lines.lines().last().expect("a line")).expect("JSON")
     };
@@ -181,7 +154,7 @@ fn each_bad_line_is_told_with_what_is_wrong_and_counted_and_the_rest_is_taken() 
     lines += &positions("uwb", 0.0);
     let home = prepared(&lines);
     let replay = ["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"];
-    let (told, err) = said(home.path(), &[&replay[..], &IN_TWIN].concat());
+    let (told, err) = said_and_warned(home.path(), &[&replay[..], &IN_TWIN].concat());
     for ((line, what), (number, message)) in bad.iter().zip(err.lines().enumerate()) {
         let begins = format!("fixes.jsonl, line {}: ", number + 1);
         assert!(message.starts_with(&begins) && message.contains(what), "{line}: {message}");
@@ -199,7 +172,7 @@ fn each_bad_line_is_told_with_what_is_wrong_and_counted_and_the_rest_is_taken() 
 #[test]
 fn sources_that_contradict_each_other_are_told_of_once() {
     let home = prepared(&(positions("uwb", 2.5) + &positions("wifi", -2.5)));
-    let (_, err) = said(home.path(), &["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
+    let (_, err) = said_and_warned(home.path(), &["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
     let contradictions: Vec<_> = err.lines().filter(|line| line.contains("contradict each other")).collect();
     assert!(matches!(contradictions[..], [line] if line.contains("uwb and wifi")), "{err}");
 }
@@ -209,19 +182,19 @@ fn a_recording_keeps_what_was_said_and_is_replayed_with_it() {
     let home = prepared(&positions("uwb", 0.0));
     let folder = home.path();
     let replay = ["replay", "walk.mcap", "--fixes", "fixes.jsonl", "--out", "out"];
-    said(folder, &[&replay[..], &IN_TWIN].concat());
+    said_and_warned(folder, &[&replay[..], &IN_TWIN].concat());
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("it was written");
     let (path, places) = (read("out/fixes.csv"), read("out/places.jsonl"));
     let recorded = sohle::recording::open(&folder.join("out/recording.mcap"), None).expect("it is a recording");
     assert_eq!(recorded.fixes.len(), 21);
     assert_eq!(&*recorded.fixes[3].source, "uwb");
     std::fs::rename(folder.join("out/recording.mcap"), folder.join("kept.mcap")).expect("it is there");
-    let (told, _) = said(folder, &[&["replay", "kept.mcap", "--out", "out"][..], &IN_TWIN].concat());
+    let (told, _) = said_and_warned(folder, &[&["replay", "kept.mcap", "--out", "out"][..], &IN_TWIN].concat());
     assert!(told.contains("positions of  all  taken"), "{told}");
     assert_eq!((read("out/fixes.csv"), read("out/places.jsonl")), (path, places));
     // Others come in their place.
     std::fs::write(folder.join("fixes.jsonl"), positions("wifi", 0.0)).expect("it can be written");
-    said(folder, &["replay", "kept.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
+    said_and_warned(folder, &["replay", "kept.mcap", "--fixes", "fixes.jsonl", "--out", "out"]);
     let recorded = sohle::recording::open(&folder.join("out/recording.mcap"), None).expect("it is a recording");
     assert!(recorded.fixes.len() == 21 && recorded.fixes.iter().all(|fix| &*fix.source == "wifi"));
 }
@@ -230,7 +203,7 @@ fn a_recording_keeps_what_was_said_and_is_replayed_with_it() {
 fn the_matcher_on_the_walk_graph_finds_by_positions_who_starts_anywhere() {
     let home = prepared(&positions("uwb", 0.0).replace("\"sigma_m\"", "\"floor\":0,\"sigma_m\""));
     let graph = ["graph", "walk.mcap", "--building", "twin.geojson", "--start", "anywhere"];
-    let with = |options: &[&str]| said(home.path(), &[&graph[..], options].concat()).0;
+    let with = |options: &[&str]| said_and_warned(home.path(), &[&graph[..], options].concat()).0;
     let told = with(&["--fixes", "fixes.jsonl"]);
     // Rank, per cent, floor, x, y of the likeliest place.
     let first = told.lines().find_map(|line| line.strip_prefix("1 ")).expect("a place");

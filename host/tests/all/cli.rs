@@ -2,21 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot run its program has failed")]
 
+use crate::command::sohle;
 use geojson::GeoJson;
 use resvg::usvg;
 use std::path::Path;
-use std::process::{Command, Output};
-
-/// Runs the program in `folder`.
-fn sohle(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sohle"))
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
+use std::process::Output;
 
 fn stdout(output: &Output) -> &str {
     std::str::from_utf8(&output.stdout).unwrap()

@@ -1,5 +1,6 @@
 //! `sohle live` with a shoe in the same process: its application behind a network port, the sensor played back.
 
+use crate::command::program;
 use sohle_shared::bmx055::{Batch, Config};
 use sohle_shared::calibration::Calibration;
 use sohle_shared::selftest::{Batches, STRIDES};
@@ -14,7 +15,7 @@ use sohle_shared::wire::packed::PackedStep;
 use sohle_shared::wire::port::Port;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
-use std::process::{Command, Output};
+use std::process::Output;
 use std::time::{Duration, Instant};
 
 /// The walk takes 33 s; here it goes so much faster.
@@ -119,12 +120,7 @@ fn accept(listener: &TcpListener) -> TcpStream {
 }
 
 fn sohle(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sohle"))
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .args(arguments)
-        .output()
-        .expect("it was built")
+    program().args(arguments).output().expect("it was built")
 }
 
 #[test]

@@ -2,33 +2,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot run its program has failed")]
 
+use crate::command;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn sohle(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sohle"))
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .arg("building")
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
 
 #[track_caller]
 fn said(folder: &Path, arguments: &[&str]) -> String {
-    let output = sohle(folder, arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    command::said(folder, &[&["building"], arguments].concat())
 }
 
 #[track_caller]
 fn refused(folder: &Path, arguments: &[&str], code: i32) -> String {
-    let output = sohle(folder, arguments);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!((output.status.code(), told.lines().count()), (Some(code), 1), "{told}");
-    told
+    command::refused_with(code, folder, &[&["building"], arguments].concat())
 }
 
 #[test]
@@ -60,7 +44,7 @@ fn the_check_ends_with_an_error_where_there_is_one_and_marks_it() {
     // Without the lines that hold the walls.
     let broken: Vec<_> = text.lines().filter(|line| !line.contains("\"wall\"")).collect();
     std::fs::write(folder.join("open.geojson"), broken.join("\n")).unwrap();
-    let output = sohle(folder, &["check", "open.geojson", "--json", "--out", "marked"]);
+    let output = command::sohle(folder, &["building", "check", "open.geojson", "--json", "--out", "marked"]);
     assert_eq!(output.status.code(), Some(1));
     let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&told["errors"], &told["findings"][0]["kind"]), (&2.into(), &"no-walls".into()));

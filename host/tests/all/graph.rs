@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot run its program has failed")]
 
+use crate::command::{refused, said, sohle};
 use sohle::building::check::{Finding, Kind, Level, check};
 use sohle::building::geometry::{self, Segment};
 use sohle::building::open::{Options, open};
@@ -9,33 +10,6 @@ use sohle::graph::Graph;
 use sohle::graph::draw::{self, draw};
 use sohle::graph::lint::{self, lint};
 use sohle::recording::recordings_dir;
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn sohle(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sohle"))
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
-#[track_caller]
-fn said(folder: &Path, arguments: &[&str]) -> String {
-    let output = sohle(folder, arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-#[track_caller]
-fn refused(folder: &Path, arguments: &[&str]) -> String {
-    let output = sohle(folder, arguments);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!((output.status.code(), told.lines().count()), (Some(1), 1), "{told}");
-    told
-}
 
 fn house() -> tempfile::TempDir {
     let home = tempfile::tempdir().unwrap();
@@ -210,7 +184,7 @@ fn the_suite_prints_the_table_that_is_kept() {
     let home = tempfile::tempdir().unwrap();
     let arguments = ["evaluate", "--suite", "graph", "--walks", FEW, "--pictures", "drawn"];
     let printed = said(home.path(), &arguments);
-    let kept = include_str!("../../tests/graph.txt");
+    let kept = include_str!("../../../tests/graph.txt");
     assert_eq!(printed, kept, "if that is meant: sohle evaluate --suite graph --walks {FEW} > tests/graph.txt");
     assert!(std::fs::read(home.path().join("drawn/graph-eight.png")).unwrap().starts_with(b"\x89PNG"));
 }

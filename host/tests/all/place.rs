@@ -1,41 +1,11 @@
 //! From a building to a walk in it, and from the walk back to the place, as a user does it.
 
-use nalgebra::{Matrix4, Vector3};
+use crate::command::{refused, said, sohle, steps};
 use sohle::building::georeference::Georeference;
 use sohle::building::{Building, generate, geojson};
 use sohle::recording::{Recording, mcap};
-use sohle_shared::sample::ClippedSamples;
-use sohle_shared::step::{FloorMode, Step, StepQuality};
-use sohle_shared::time::Micros;
+use sohle_shared::step::Step;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn sohle(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sohle"))
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("it starts")
-}
-
-/// Runs a command that must succeed; what it says.
-#[track_caller]
-fn said(folder: &Path, arguments: &[&str]) -> String {
-    let output = sohle(folder, arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("it is text")
-}
-
-/// Runs a command that must fail with one line; the line.
-#[track_caller]
-fn refused(folder: &Path, arguments: &[&str]) -> String {
-    let output = sohle(folder, arguments);
-    let told = String::from_utf8(output.stderr).expect("it is text");
-    assert_eq!((output.status.code(), told.lines().count()), (Some(1), 1), "{told}");
-    told
-}
 
 #[test]
 fn somebody_who_may_be_anywhere_is_found_in_the_right_room_of_the_right_floor() {
@@ -80,22 +50,6 @@ fn what_makes_no_sense_is_told_before_anything_is_written() {
     assert!(!folder.join("out").exists());
 }
 
-/// Twelve strides of 1.2 m straight ahead, as a shoe tells them, without the samples.
-fn steps() -> Vec<Step> {
-    let step = |index: u32| Step {
-        index,
-        stance_start: Micros(i64::from(index) * 1_100_000),
-        stance_end: Micros(i64::from(index) * 1_100_000 + 400_000),
-        displacement: Vector3::new(if index == 0 { 0.0 } else { 1.2 }, 0.0, 0.0),
-        turn: 0.0,
-        covariance: Matrix4::identity() * 1e-4,
-        mode: FloorMode::Level,
-        quality: StepQuality::default(),
-        clipped: ClippedSamples::default(),
-    };
-    (0..=12).map(step).collect()
-}
-
 fn write_steps(folder: &Path, name: &str, steps: Vec<Step>) {
     let recording = Recording { name: name.into(), steps, ..Recording::default() };
     mcap::write(&folder.join(name), &recording).expect("it can be written");
@@ -125,7 +79,7 @@ fn a_building_without_walls_is_refused_from_an_unknown_start_and_warned_of_from_
     let mut bare = generate::twin(2);
     bare.floors.iter_mut().for_each(|floor| floor.walls.clear());
     write_building(folder, "bare.geojson", &bare);
-    write_steps(folder, "walk.mcap", steps());
+    write_steps(folder, "walk.mcap", steps(12));
     let told = refused(folder, &replay("bare.geojson", "anywhere", &[]));
     assert!(told.contains("has no walls, so a start that is not known can never be found"), "{told}");
     assert!(!folder.join("out").exists());
@@ -141,7 +95,7 @@ fn a_building_without_walls_is_refused_from_an_unknown_start_and_warned_of_from_
 fn a_building_without_floors_is_refused_and_one_floor_is_enough() {
     let home = tempfile::tempdir().expect("a folder");
     let folder = home.path();
-    write_steps(folder, "walk.mcap", steps());
+    write_steps(folder, "walk.mcap", steps(12));
     let none = r#"{"type": "FeatureCollection", "features": [],
         "sohle_building": {"version": 1, "name": "None", "georeference": {"kind": "local"}, "floors": []}}"#;
     std::fs::write(folder.join("none.geojson"), none).expect("it can be written");
@@ -163,7 +117,7 @@ fn a_step_of_thirty_metres_is_told_and_taken_for_a_hole() {
     let home = tempfile::tempdir().expect("a folder");
     let folder = home.path();
     said(folder, &["building", "generate", "twin", "twin.geojson"]);
-    let mut steps = steps();
+    let mut steps = steps(12);
     steps[6].displacement.x = 30.0;
     write_steps(folder, "walk.mcap", steps);
     let output = sohle(folder, &replay("twin.geojson", CORRIDOR, &[]));
@@ -185,7 +139,7 @@ fn the_walk_goes_to_files_and_the_standard_output() {
     said(folder, &["building", "generate", "twin", "twin.geojson"]);
     let georeference = Georeference::Geographic { origin: [16.37, 48.2], rotation_deg: 0.0 };
     write_building(folder, "vienna.geojson", &Building { georeference, ..generate::twin(2) });
-    write_steps(folder, "walk.mcap", steps());
+    write_steps(folder, "walk.mcap", steps(12));
     let lines = said(folder, &replay("twin.geojson", CORRIDOR, &["--places", "-"]));
     let places: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     assert_eq!(places.len(), 13, "nothing else is on the standard output");
@@ -220,7 +174,7 @@ fn the_recording_shows_plan_place_and_particles() {
     let home = tempfile::tempdir().expect("a folder");
     let folder = home.path();
     said(folder, &["building", "generate", "twin", "twin.geojson"]);
-    write_steps(folder, "walk.mcap", steps());
+    write_steps(folder, "walk.mcap", steps(12));
     said(folder, &replay("twin.geojson", CORRIDOR, &[]));
     let bytes = std::fs::read(folder.join("out/recording.mcap")).expect("it was written");
     let mut counts = std::collections::BTreeMap::new();
