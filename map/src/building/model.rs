@@ -235,12 +235,17 @@ fn check_outline(outline: &[Point], what: &str) -> Result<(), Error> {
     if outline.len() < 3 {
         return Err(Error::Model(format!("{what} has {} corners; an area needs three", outline.len())));
     }
-    if !outline.iter().all(is_place) {
-        return Err(Error::Model(format!(
-            "{what} reaches beyond {FARTHEST_M} m from the origin, or to no place at all"
-        )));
+    check_places(outline.iter(), what)
+}
+
+fn check_places<'a>(mut points: impl Iterator<Item = &'a Point>, what: &str) -> Result<(), Error> {
+    match points.find(|point| !is_place(point)) {
+        Some([x, y]) => Err(Error::Model(format!(
+            "{what} reaches to ({x}, {y}), beyond {FARTHEST_M} m from the origin or no place at all: coordinates are in metres, from a \
+             point in or near the building"
+        ))),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn check_graph(graph: &WalkGraph, numbers: &BTreeSet<i32>) -> Result<(), Error> {
@@ -269,11 +274,7 @@ impl Floor {
             return Err(Error::Model(format!("floor {number} has the height {}", self.height_m)));
         }
         let lines = self.walls.iter().chain(self.doors.iter().map(|door| &door.line));
-        if !lines.flatten().all(is_place) {
-            return Err(Error::Model(format!(
-                "a wall or a door of floor {number} reaches beyond {FARTHEST_M} m from the origin, or to no place at all"
-            )));
-        }
+        check_places(lines.flatten(), &format!("a wall or a door of floor {number}"))?;
         self.rooms
             .iter()
             .try_for_each(|room| check_outline(&room.outline, &format!("room '{}' of floor {number}", room.name)))
@@ -323,7 +324,15 @@ mod tests {
         assert_eq!(message(two(vec![floor(0, 0.0), floor(0, 1.0)])), "two floors have the same number");
         let mut bad = two(vec![floor(0, 0.0)]);
         bad.floors[0].walls.push([[0.0, f64::NAN], [1.0, 1.0]]);
-        assert!(message(bad).starts_with("a wall or a door of floor 0 reaches beyond"));
+        assert!(message(bad).starts_with("a wall or a door of floor 0 reaches to (0, NaN), beyond"));
+        // Millimetres.
+        let mut bad = two(vec![floor(0, 0.0)]);
+        bad.floors[0].rooms[0].outline[1][0] = 5_250.0;
+        assert_eq!(
+            message(bad),
+            "room '1' of floor 0 reaches to (5250, 0), beyond 5000 m from the origin or no place at all: coordinates are in metres, \
+             from a point in or near the building"
+        );
         let mut bad = two(vec![floor(0, 0.0)]);
         bad.floors[0].rooms[0].outline.truncate(2);
         assert_eq!(message(bad), "room '1' of floor 0 has 2 corners; an area needs three");
