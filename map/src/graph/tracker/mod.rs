@@ -63,7 +63,7 @@ pub struct Tracker<'a> {
     variance: Variance,
     /// What the barometer tells, if there is one.
     floors: Option<Floors>,
-    /// What map matching compares routes to.
+    /// What map matching compares routes to, where edges are searched for by that.
     history: matching::History,
 }
 
@@ -107,7 +107,9 @@ impl<'a> Tracker<'a> {
         let before = self.delta;
         self.delta = wrapped(before + turn);
         let length_m = self.length(measured_m);
-        self.history.step(turn, length_m);
+        if self.parameters.search == SearchBy::MapMatching {
+            self.history.step(turn, length_m);
+        }
         let heading = self.heading();
         if let Some((from, _)) = &mut self.searched {
             *from = [from[0] + length_m * heading.cos(), from[1] + length_m * heading.sin()];
@@ -302,9 +304,11 @@ impl<'a> Tracker<'a> {
         self.by_turn = true;
         self.lay(metres, length_m);
         self.variance = Variance::default();
-        let node = self.turned_at;
-        let turn = matching::Turn { node, place: self.graph.node(node).place, ..self.as_turn() };
-        self.history.turned(turn, &self.parameters.matching);
+        if self.parameters.search == SearchBy::MapMatching {
+            let node = self.turned_at;
+            let turn = matching::Turn { node, place: self.graph.node(node).place, ..self.as_turn() };
+            self.history.turned(turn, &self.parameters.matching);
+        }
     }
 
     /// The edges that leave a node on foot, by their angle to a heading.
