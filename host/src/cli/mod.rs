@@ -6,7 +6,7 @@
 //! was wrong).
 
 pub mod beacons;
-mod bench;
+pub mod bench;
 pub mod building;
 pub mod calibrate;
 pub mod command;

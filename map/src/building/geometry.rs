@@ -12,6 +12,11 @@ pub fn distance(a: Point, b: Point) -> f64 {
     (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
+/// From a point to another. **Units:** rad; counted from x over y.
+pub fn direction(from: Point, to: Point) -> f64 {
+    (to[1] - from[1]).atan2(to[0] - from[0])
+}
+
 /// The same angle within half a turn. **Units:** rad.
 pub fn wrapped(angle: f64) -> f64 {
     use std::f64::consts::PI;

@@ -6,7 +6,7 @@ use super::error::Error;
 use super::geometry::{self, Point};
 use super::model::{Building, Connector, ConnectorKind, Floor};
 use pathfinding::prelude::astar;
-use std::f64::consts::{FRAC_PI_3, TAU};
+use std::f64::consts::FRAC_PI_3;
 
 /// Side of a cell. **Units:** m.
 const CELL_M: f64 = 0.15;
@@ -427,13 +427,8 @@ impl<'a> Free<'a> {
 
 /// How much somebody turns on a way, to the left and to the right. **Units:** rad.
 fn turning(points: &[Point]) -> f64 {
-    let direction = |pair: &[Point]| (pair[1][1] - pair[0][1]).atan2(pair[1][0] - pair[0][0]);
-    let directions: Vec<f64> = points.windows(2).map(direction).collect();
-    let turn = |pair: &[f64]| {
-        let turn = (pair[1] - pair[0]).abs();
-        turn.min(TAU - turn)
-    };
-    directions.windows(2).map(turn).sum()
+    let directions: Vec<f64> = points.windows(2).map(|pair| geometry::direction(pair[0], pair[1])).collect();
+    directions.windows(2).map(|pair| geometry::wrapped(pair[1] - pair[0]).abs()).sum()
 }
 
 #[cfg(test)]

@@ -159,7 +159,7 @@ impl Graph {
                     kind,
                     length_m: geometry::distance(a.place, b.place),
                     rise_m: b.height_m - a.height_m,
-                    direction: (b.place[1] - a.place[1]).atan2(b.place[0] - a.place[0]),
+                    direction: geometry::direction(a.place, b.place),
                 };
             }
         }

@@ -264,7 +264,7 @@ impl Guide<'_> {
             return self.graph.edge(first).direction;
         };
         let points = self.line(piece);
-        points.get(1).map_or(0.0, |to| (to[1] - points[0][1]).atan2(to[0] - points[0][0]))
+        points.get(1).map_or(0.0, |to| geometry::direction(points[0], *to))
     }
 
     /// The corners of a level piece.
@@ -282,7 +282,7 @@ impl Guide<'_> {
         // A turn that is being made: where it began, how far it has gone, and how long ago it last went on.
         let mut turning: Option<(Point, f64, f64, f64)> = None;
         for pair in points.windows(2) {
-            let direction = (pair[1][1] - pair[0][1]).atan2(pair[1][0] - pair[0][0]);
+            let direction = geometry::direction(pair[0], pair[1]);
             let angle = heading.map_or(0.0, |before| wrapped(direction - before));
             if angle.abs() >= STRAIGHT {
                 match &mut turning {

@@ -87,7 +87,7 @@ fn rectangularity(walls: &[Segment]) -> f64 {
     let (mut x, mut y, mut total) = (0.0, 0.0, 0.0);
     for wall in walls {
         let length = geometry::length(wall);
-        let angle = 4.0 * (wall[1][1] - wall[0][1]).atan2(wall[1][0] - wall[0][0]);
+        let angle = 4.0 * geometry::direction(wall[0], wall[1]);
         (x, y, total) = (x + length * angle.cos(), y + length * angle.sin(), total + length);
     }
     if total > 0.0 { x.hypot(y) / total } else { 0.0 }

@@ -20,7 +20,7 @@ impl Flight {
         let next = if end == 0 { self.between.first() } else { self.between.last() };
         let from = next.map_or(self.landings[1 - end], |&[x, y, _]| [x, y]);
         let to = self.landings[end];
-        (geometry::distance(from, to) > 0.1).then(|| (to[1] - from[1]).atan2(to[0] - from[0]))
+        (geometry::distance(from, to) > 0.1).then(|| geometry::direction(from, to))
     }
 }
 

@@ -364,7 +364,7 @@ fn turned([x, y]: Point, angle: f64) -> Point {
 /// The direction along which, or across which, most of the length of the walls lies. **Units:** rad, in [0, pi/2).
 fn direction(walls: &[Segment]) -> f64 {
     let quarter = std::f64::consts::FRAC_PI_2;
-    let of = |wall: &Segment| (wall[1][1] - wall[0][1]).atan2(wall[1][0] - wall[0][0]).rem_euclid(quarter);
+    let of = |wall: &Segment| geometry::direction(wall[0], wall[1]).rem_euclid(quarter);
     let mut bins = [0.0_f64; DIRECTIONS];
     for wall in walls {
         bins[(of(wall) / quarter * DIRECTIONS as f64) as usize % DIRECTIONS] += geometry::length(wall);

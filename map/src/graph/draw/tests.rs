@@ -45,7 +45,7 @@ fn the_graph_of_the_twin_leads_into_every_room_and_through_no_wall() {
 fn straight_on(graph: &Graph, from: crate::graph::NodeId, direction: f64, most: f64) -> Vec<Point> {
     let off = |id: crate::graph::EdgeId| {
         let edge = graph.edge(id);
-        (edge.direction - direction + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI
+        geometry::wrapped(edge.direction - direction)
     };
     let mut way = vec![graph.node(from).place];
     let mut here = from;

@@ -6,14 +6,14 @@ use crate::building::{Node, WalkGraph};
 use proptest::prelude::*;
 
 /// A step of the document. **Units:** m.
-const STEP: f64 = 0.68;
+pub(super) const STEP: f64 = 0.68;
 
-fn graph(places: &[Point], edges: &[[usize; 2]]) -> Graph {
+pub(super) fn graph(places: &[Point], edges: &[[usize; 2]]) -> Graph {
     let nodes = places.iter().map(|&place| Node { place, ..Node::default() }).collect();
     Graph::new(&WalkGraph { nodes, edges: edges.to_vec() }, &[]).unwrap()
 }
 
-fn edge(graph: &Graph, from: u32, to: u32) -> EdgeId {
+pub(super) fn edge(graph: &Graph, from: u32, to: u32) -> EdgeId {
     graph.between(NodeId(from), NodeId(to)).unwrap()
 }
 

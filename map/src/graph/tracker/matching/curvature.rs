@@ -11,7 +11,7 @@ pub fn curvature(points: &[Point]) -> Vec<f64> {
     let mut directions: Vec<f64> = Vec::with_capacity(points.len());
     let (mut arc, mut at) = (0.0, Vec::with_capacity(points.len()));
     for pair in points.windows(2) {
-        let direction = (pair[1][1] - pair[0][1]).atan2(pair[1][0] - pair[0][0]);
+        let direction = geometry::direction(pair[0], pair[1]);
         // Over the cut at half a turn the directions go on.
         let before = directions.last().copied().unwrap_or(direction);
         directions.push(before + geometry::wrapped(direction - before));

@@ -226,7 +226,7 @@ impl Tracker<'_> {
             let points = self.points(&edges, matching.steps);
             let (correlation, shift) = correlation(&bends, &curvature(&points), most);
             let residual = Helmert::fit(&reference.points, &points).residual(&reference.points, &points);
-            let length_m = edges.iter().map(|&edge| self.graph.edge(edge).length_m).sum();
+            let length_m = self.length_of(&edges);
             Route { edges, length_m, correlation, shift, residual }
         });
         let mut alike: Vec<Route> = compared.filter(|route| route.correlation >= thresholds.correlation).collect();
@@ -242,8 +242,7 @@ impl Tracker<'_> {
         if self.floors.as_ref().is_some_and(|floors| floors.here() != floor) {
             return Vec::new();
         }
-        let first =
-            (reference.points[1][1] - reference.points[0][1]).atan2(reference.points[1][0] - reference.points[0][0]);
+        let first = geometry::direction(reference.points[0], reference.points[1]);
         let open = |id: EdgeId| {
             let edge = graph.edge(id);
             let begins = edge.from != reference.node || self.angle(id, first) <= thresholds.begin_deg.to_radians();
@@ -266,17 +265,20 @@ impl Tracker<'_> {
             .into_iter()
             .filter(|&node| node != reference.node)
             .flat_map(|node| paths::yen_over(graph, reference.node, node, thresholds.routes, plan_length, open));
-        let length = |edges: &[EdgeId]| edges.iter().map(|&edge| graph.edge(edge).length_m).sum::<f64>();
         routes
             .map(|path| path.edges)
-            .filter(|edges| (least..=most).contains(&length(edges)) && !turns_round(edges))
+            .filter(|edges| (least..=most).contains(&self.length_of(edges)) && !turns_round(edges))
             .collect()
+    }
+
+    /// Of a route. **Units:** m.
+    fn length_of(&self, edges: &[EdgeId]) -> f64 {
+        edges.iter().map(|&edge| self.graph.edge(edge).length_m).sum()
     }
 
     /// A route as so many equal steps.
     fn points(&self, edges: &[EdgeId], steps: usize) -> Vec<Point> {
-        let lengths = edges.iter().map(|&edge| self.graph.edge(edge).length_m);
-        let total: f64 = lengths.clone().sum();
+        let total = self.length_of(edges);
         let mut points = Vec::with_capacity(steps + 1);
         let (mut number, mut before) = (0, 0.0);
         for step in 0..=steps {

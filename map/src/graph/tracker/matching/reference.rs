@@ -1,7 +1,7 @@
 //! The steps since the last turns, put end to end without the graph.
 
 use super::Thresholds;
-use crate::building::geometry::{Point, distance};
+use crate::building::geometry::{Point, between, distance};
 use crate::graph::NodeId;
 
 /// A shorter step has no direction, and adds nothing to a track. **Units:** m.
@@ -92,8 +92,7 @@ impl History {
         let step = steps.iter().map(|step| step.length_m).fold(0.0, f64::max);
         if way >= SHORTEST_M {
             let count = if step >= SHORTEST_M { (way / step).round().max(1.0) as usize } else { 1 };
-            points
-                .extend((1..=count).map(|k| crate::building::geometry::between(place, entry, k as f64 / count as f64)));
+            points.extend((1..=count).map(|k| between(place, entry, k as f64 / count as f64)));
         }
         let ([mut x, mut y], mut turned) = (entry, 0.0);
         let (mut length_m, mut least, mut greatest) = (way, 0.0_f64, 0.0_f64);

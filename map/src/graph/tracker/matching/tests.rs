@@ -1,22 +1,11 @@
 //! The steps of the document's figure 6.35, its list of restrictions, and the cubic spline, each by name.
 
+use super::super::tests::{STEP, edge, graph};
 use super::super::*;
 use super::curvature::slopes;
 use super::*;
 use crate::building::{Node, WalkGraph};
 use proptest::prelude::*;
-
-/// A step of the document. **Units:** m.
-const STEP: f64 = 0.68;
-
-fn graph(places: &[Point], edges: &[[usize; 2]]) -> Graph {
-    let nodes = places.iter().map(|&place| Node { place, ..Node::default() }).collect();
-    Graph::new(&WalkGraph { nodes, edges: edges.to_vec() }, &[]).unwrap()
-}
-
-fn edge(graph: &Graph, from: u32, to: u32) -> EdgeId {
-    graph.between(NodeId(from), NodeId(to)).unwrap()
-}
 
 /// Two corridors to the east, 9 m apart, joined at 12 m by one that runs north: node 1 is the crossing, 2 its other end.
 /// Both corridors go on to the east (3 and 4), and a third begins near the way there (5 to 6).
