@@ -195,9 +195,15 @@ fn choose(window: &mut Harness<'static, App>, which: Beside, until_is: impl Fn(&
 fn positions_are_drawn_with_the_path_that_steps_and_they_give() {
     let home = tempfile::tempdir().unwrap();
     let path = recording(&home);
-    let lines: String = (2..20)
-        .map(|second| format!("{{\"time_us\":{second}000000,\"position\":[14.0,6.0],\"sigma_m\":15}}\n"))
-        .collect();
+    // Where somebody is in truth, each second of the first part.
+    let recording = crate::recording::read(&path, std::fs::File::open(&path).unwrap(), None).unwrap();
+    let truth = recording.truth.unwrap();
+    let line = |second: i64| {
+        let at = truth.poses.partition_point(|pose| pose.time.0 < second * 1_000_000);
+        let [x, y, _] = truth.poses[at].position;
+        format!("{{\"time_us\":{second}000000,\"position\":[{x},{y}],\"sigma_m\":1}}\n")
+    };
+    let lines: String = (2..20).map(line).collect();
     let fixes = home.path().join("fixes.jsonl");
     std::fs::write(&fixes, lines + "no JSON\n").unwrap();
     let mut window = window(None);
@@ -214,7 +220,8 @@ fn positions_are_drawn_with_the_path_that_steps_and_they_give() {
         tracks.iter().find(|track| track.name == name).map(|track| track.pieces.len())
     };
     // Each position is a cross of two strokes.
-    until(&mut window, |app| pieces(app, "positions") == Some(36) && pieces(app, "steps and positions") == Some(1));
+    until(&mut window, |app| app.snapshot().computing.is_none() && pieces(app, "positions") == Some(36));
+    assert_eq!(pieces(window.state(), "steps and positions"), Some(1));
     assert!(window.query_all_by_label_contains(" by 18 positions").next().is_some());
     choose(&mut window, Beside::Positions, |app| pieces(app, "positions").is_none());
 }

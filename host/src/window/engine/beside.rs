@@ -181,7 +181,7 @@ fn told(fusion: &Fusion) -> String {
             let [x, y] = estimate.place;
             format!("({x:.1}, {y:.1}) m, +- {:.1} m by {heard} positions", estimate.sigma_m())
         }
-        None => format!("{heard} positions have come; the place is not known yet"),
+        None => format!("{heard} positions have come; the place is not known well enough"),
     }
 }
 
