@@ -1,17 +1,18 @@
 //! A live shoe without hardware: the firmware's loops on an emulated Cortex-M4F, its serial line a TCP port.
 
+mod check;
 mod live;
 pub mod machine;
 mod pace;
 mod proxy;
 pub mod radio;
 
-use crate::firmware::{self, Budget, Budgets};
+use crate::firmware::Budget;
 use crate::process::{self, Failure};
-use crate::{device, in_root, tools};
+use crate::{in_root, tools};
+pub use check::check;
 use live::{Live, Walk};
-use machine::{INSTRUCTIONS_PER_S, Running, free_port, machine};
-use proxy::Proxy;
+use machine::{Running, machine};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -51,12 +52,6 @@ const RECORDINGS: [(&str, Option<&str>, u32); 2] =
     [("foot_xio/short_walk.csv", None, 46), ("foot_gaitmap/imu_sample.csv", Some("gaitmap-left"), 45)];
 /// How long the simulated walk lasts in the check. **Units:** s.
 const SIMULATED_S: u32 = 40;
-/// The walk of that check, 4 s of rest before and after it included; from then on the foot stands. **Units:** s.
-const SHORT_S: u32 = 24;
-/// In the check of its sleep the shoe sleeps when it has stood so long. **Units:** s.
-const SLEEP_AFTER_S: u32 = 3;
-/// After that walk: to fall asleep, and to tell twice of it. **Units:** s.
-const ASLEEP_S: u32 = SLEEP_AFTER_S + 15;
 
 /// Runs the shoe until it is stopped.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -127,61 +122,6 @@ struct Summary {
     sleeps: Option<u32>,
 }
 
-/// The bits of the emulated processor against this one's, and a walk over a bad line.
-pub fn check() -> Result<(), Failure> {
-    tools::QEMU.required()?;
-    let sohle = process::build("dev", "--bin", "sohle")?;
-    machine::build(&[])?;
-    let folder = in_root("target/emulate");
-    std::fs::create_dir_all(&folder).map_err(|source| file(&folder, source))?;
-    let statics = firmware::statics_without(&device::binary("sohle-shoe"), &TWIN)?;
-    let mut stack = 0;
-    let mut walks = Vec::new();
-    for (name, profile, seconds) in RECORDINGS {
-        let here = ["recordings", "../shared/recordings"].map(|folder| in_root(folder).join(name));
-        match here.into_iter().find(|path| path.is_file()) {
-            Some(path) => walks.push((name, path, profile, seconds)),
-            None => println!("{name} is not here and is skipped"),
-        }
-    }
-    walks.push(("a simulated walk", simulated(&sohle, &folder, "demo", 1)?, None, SIMULATED_S));
-
-    println!("(delays are right on a machine that does nothing else: on others the emulated clock falls behind)");
-    println!("walk                          steps  delay ms, median / longest  load 1/1000  stack");
-    for (name, walk, profile, seconds) in &walks {
-        let counts = converted(&sohle, &folder, walk, *profile)?;
-        let live = folder.join("live.mcap");
-        match std::fs::remove_file(&live) {
-            Err(source) if source.kind() != std::io::ErrorKind::NotFound => return Err(file(&live, source)),
-            _ => {}
-        }
-        let port = free_port()?;
-        let mut running = Running::start(port, &counts)?;
-        let Walk { summary, .. } = live_walk(&sohle, &mut running, port, *seconds, |command| {
-            command.arg("--raw").arg("--out").arg(&live);
-        })?;
-        drop(running);
-        row(name, &summary);
-        stack = stack.max(summary.stack.unwrap_or_default());
-        if summary.frames_bad > 0 || summary.steps == 0 {
-            return Err(Failure::Found(format!("{name}: {} steps, {} bad frames", summary.steps, summary.frames_bad)));
-        }
-        let again = process::read(
-            Command::new(&sohle).args(["replay", "--headless"]).arg(&live).arg("--out").arg(folder.join("again")),
-        )?;
-        let told = again.out.lines().find(|line| line.contains("bit for bit"));
-        println!("  {}", told.ok_or_else(|| Failure::Found(format!("{name}: nothing was computed again")))?);
-    }
-    let (_, walk, profile, seconds) = &walks[0];
-    let bad = over_a_bad_line(&sohle, &converted(&sohle, &folder, walk, *profile)?, *seconds)?;
-    let walk = folder.join("short.mcap");
-    let mut command = Command::new(&sohle);
-    command.args(["simulate", "--gait", "walk", "--strides", "10", "--out"]).arg(&walk);
-    process::read(&mut command)?;
-    let slept = asleep(&sohle, &folder, &converted(&sohle, &folder, &walk, None)?)?;
-    within_budget(statics, stack.max(bad).max(slept), Budgets::read()?.wired)
-}
-
 /// All that the shoe needs of the RAM, against its budget. What the twin and the walk keep is left out, since no board has
 /// either; the stack below the twin's driver is not. It holds the shoe itself, as on the boards.
 fn within_budget(statics: u64, stack: u32, budget: Budget) -> Result<(), Failure> {
@@ -189,77 +129,6 @@ fn within_budget(statics: u64, stack: u32, budget: Budget) -> Result<(), Failure
     let told = format!("{statics} bytes of statics and {stack} of stack are {ram} of RAM, of {budget}");
     println!("  {told}");
     if stack > 0 && ram <= budget { Ok(()) } else { Err(Failure::Found(told)) }
-}
-
-/// A short walk with a sensor that sleeps soon: the shoe must sleep before and after it, and miss no step. What
-/// the processor does then goes to the twin's readings for the most part, which no real board has to make. Tells the depth
-/// of the stack.
-fn asleep(sohle: &Path, folder: &Path, counts: &Path) -> Result<u32, Failure> {
-    let parameters = |seconds: u32| {
-        let path = folder.join("parameters.toml");
-        let text = format!("sleep_after_s = {seconds}.0\n");
-        std::fs::write(&path, text).map_err(|source| file(&path, source)).map(|()| path)
-    };
-    let walk = |sleep_after_s, seconds| {
-        let parameters = parameters(sleep_after_s)?;
-        let port = free_port()?;
-        let mut running = Running::start(port, counts)?;
-        let Walk { summary, .. } = live_walk(sohle, &mut running, port, seconds, |command| {
-            command.arg("--no-record").arg("--parameters").arg(parameters);
-        })?;
-        Ok::<_, Failure>(summary)
-    };
-    let awake = walk(0, SHORT_S)?;
-    let slept = walk(SLEEP_AFTER_S, SHORT_S + ASLEEP_S)?;
-    row("ten strides, awake", &awake);
-    row("the same, asleep before and after", &slept);
-    let instructions = |load: u32| f64::from(load) * 1e-3 * INSTRUCTIONS_PER_S * 1e-6;
-    let (busy, idle) = (instructions(slept.load_max), instructions(slept.load.unwrap_or_default()));
-    let sleeps = slept.sleeps.unwrap_or_default();
-    println!("  it slept {sleeps} times; {busy:.1} million instructions a second at most, {idle:.2} million asleep");
-    if slept.asleep != Some(true) || slept.steps != awake.steps || sleeps == 0 || slept.lost + slept.doubled > 0 {
-        let (steps, all) = (slept.steps, awake.steps);
-        return Err(Failure::Found(format!("it slept {sleeps} times, and of {all} steps {steps} came")));
-    }
-    Ok(slept.stack.max(awake.stack).unwrap_or_default())
-}
-
-/// The first walk over a line that damages bytes and loses pieces, both ways: every step must arrive, once. Tells the depth
-/// of the stack.
-fn over_a_bad_line(sohle: &Path, counts: &Path, seconds: u32) -> Result<u32, Failure> {
-    let (shoe, laptop) = (free_port()?, free_port()?);
-    let mut running = Running::start(shoe, counts)?;
-    let proxy =
-        Proxy::start(laptop, shoe).map_err(|source| Failure::NotStarted { program: "the bad line".into(), source })?;
-    // Time for what is sent again.
-    let Walk { summary, .. } = live_walk(sohle, &mut running, laptop, seconds + 10, |command| {
-        command.arg("--no-record");
-    })?;
-    let (damaged, lost) = proxy.faults();
-    drop(running);
-    row("the first over a bad line", &summary);
-    println!("  the line damaged {damaged} bytes and lost {lost} pieces; {} frames were refused", summary.frames_bad);
-    let waiting = summary.waiting.unwrap_or(u32::MAX);
-    if summary.lost + summary.doubled + u64::from(waiting) > 0 || summary.steps == 0 || damaged == 0 || lost == 0 {
-        return Err(Failure::Found(format!(
-            "over a bad line {} steps came, {} were lost, {} came twice, {waiting} wait",
-            summary.steps, summary.lost, summary.doubled
-        )));
-    }
-    Ok(summary.stack.unwrap_or_default())
-}
-
-fn row(name: &str, summary: &Summary) {
-    let cell = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.1}"));
-    let number = |value: Option<u32>| value.map_or("-".into(), |value| value.to_string());
-    println!(
-        "{name:<30}{:>5} {:>18} / {:<8} {:>11} {:>6}",
-        summary.steps,
-        cell(summary.delay_median_ms),
-        cell(summary.delay_max_ms),
-        number(summary.load),
-        number(summary.stack)
-    );
 }
 
 /// `sohle live` with `more` of its arguments, until the shoe's clock is so far.

@@ -5,11 +5,9 @@
 //! the stable one takes; without a sanitizer, since there is no unsafe code to be caught.
 
 use crate::process::{self, Failure};
-use crate::{in_root, tools};
+use crate::{in_root, together, tools};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Mutex;
-use std::thread;
 
 mod report;
 
@@ -136,22 +134,7 @@ fn limits() -> [String; 3] {
 
 /// Runs the targets, so many at a time, and prints a table. An error when one has a finding.
 fn fuzz(programs: &Path, targets: &[String], seconds: u64, jobs: usize) -> Result<(), Failure> {
-    let waiting = Mutex::new(targets.iter());
-    let reports = Mutex::new(Vec::new());
-    let work = || {
-        loop {
-            // Nobody panics while he holds it.
-            let next = waiting.lock().ok().and_then(|mut waiting| waiting.next());
-            let Some(target) = next else { return };
-            let report = run_target(programs, target, seconds);
-            if let Ok(mut reports) = reports.lock() {
-                reports.push(report);
-            }
-        }
-    };
-    thread::scope(|scope| (0..jobs.clamp(1, targets.len().max(1))).for_each(|_| _ = scope.spawn(work)));
-    let reports: Result<Vec<Report>, Failure> = reports.into_inner().unwrap_or_default().into_iter().collect();
-    report::conclude(reports?)
+    report::conclude(together::each(targets.iter().collect(), jobs, |target| run_target(programs, target, seconds))?)
 }
 
 /// Runs a target for so long. **Units:** s.

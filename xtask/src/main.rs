@@ -13,6 +13,7 @@ mod fuzz;
 mod process;
 mod recordings;
 mod stage;
+mod together;
 mod tools;
 mod window;
 

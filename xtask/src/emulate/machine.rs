@@ -3,9 +3,11 @@
 use super::pace::Pace;
 use crate::process::{self, Failure};
 use crate::{device, in_root};
+use std::collections::BTreeSet;
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 
 /// Virtual nanoseconds of an instruction, as a power of two: 62.5 million instructions in a second, about what a Cortex-M4F
 /// at 64 MHz executes.
@@ -86,8 +88,14 @@ impl Drop for Running {
     }
 }
 
-/// A port that nobody listens on now.
+/// A port that nobody listens on now, and that was not told before: who asked for that one may not listen yet.
 pub fn free_port() -> Result<u16, Failure> {
-    let listener = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
-    listener.map(|address| address.port()).map_err(|error| Failure::Found(format!("no free port: {error}")))
+    static TOLD: Mutex<BTreeSet<u16>> = Mutex::new(BTreeSet::new());
+    let failed = |error: std::io::Error| Failure::Found(format!("no free port: {error}"));
+    loop {
+        let port = TcpListener::bind("127.0.0.1:0").and_then(|it| it.local_addr()).map_err(failed)?.port();
+        if TOLD.lock().unwrap_or_else(PoisonError::into_inner).insert(port) {
+            return Ok(port);
+        }
+    }
 }
