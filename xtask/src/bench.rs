@@ -5,12 +5,15 @@
 
 use crate::cost::{self, Cost};
 use crate::process::{self, Failure};
-use crate::tools;
+use crate::{together, tools};
 use std::path::Path;
 use std::process::Command;
 
 /// Sampling of the counted walks. **Units:** microseconds.
 const PERIODS_US: [u32; 2] = [5_000, 500];
+
+/// Of the tracker, in the order of [`cost::table`].
+const SETTINGS: [&str; 2] = ["default", "documented"];
 
 /// A prediction of the default filter must cost less than this part of a documented one.
 const LARGEST_SHARE: f64 = 0.5;
@@ -34,30 +37,28 @@ pub fn run() -> Result<(), Failure> {
 
 fn particles() -> Result<(), Failure> {
     let program = process::build("release", "--example", "particle_cost")?;
-    let cost = |part: &str, numbers: [u16; 3]| {
+    let clouds = BUILDINGS.iter().flat_map(|&(building, clouds)| clouds.iter().map(move |&cloud| (building, cloud)));
+    let clouds: Vec<([u16; 2], u16)> = clouds.collect();
+    let parts = ["moves", "draw", "clusters"];
+    let wanted =
+        clouds.iter().flat_map(|&([floors, rooms], particles)| parts.map(|part| (part, [particles, floors, rooms])));
+    let wanted = [("reference", [10_000, 1, 6])].into_iter().chain(wanted).collect();
+    let costs = together::each(wanted, together::processors(), |(part, numbers)| {
         let numbers = numbers.map(|number| number.to_string());
         let words = [part].into_iter().chain(numbers.each_ref().map(String::as_str));
-        Ok::<_, Failure>(count(&program, words)?.mean())
-    };
-    let reference = cost("reference", [10_000, 1, 6])?;
+        Ok(count(&program, words)?.mean())
+    })?;
+    let (reference, costs) = (costs[0], costs[1..].chunks_exact(parts.len()));
     println!(
         "instructions for each particle, and the ratio of moves with walls to a textbook's without, {reference:.0} (x86-64)"
     );
     println!("  floors  rooms/floor  particles      moves       draw   clusters      ratio");
     let mut sums = Vec::new();
-    for ([floors, rooms], clouds) in BUILDINGS {
-        for &particles in clouds {
-            let [moves, draw, clusters] =
-                ["moves", "draw", "clusters"].map(|part| cost(part, [particles, floors, rooms]));
-            let (moves, draw) = (moves?, draw?);
-            let ratio = moves / reference;
-            let rooms = u32::from(rooms).pow(2);
-            println!(
-                "  {floors:>6} {rooms:>12} {particles:>10} {moves:>10.1} {draw:>10.1} {:>10.1} {ratio:>10.2}",
-                clusters?
-            );
-            sums.push(moves + draw);
-        }
+    for (([floors, rooms], particles), costs) in clouds.into_iter().zip(costs) {
+        let (moves, draw, clusters) = (costs[0], costs[1], costs[2]);
+        let (ratio, rooms) = (moves / reference, u32::from(rooms).pow(2));
+        println!("  {floors:>6} {rooms:>12} {particles:>10} {moves:>10.1} {draw:>10.1} {clusters:>10.1} {ratio:>10.2}");
+        sums.push(moves + draw);
     }
     let (first, last) = (sums[0], sums[sums.len() - 1]);
     if last < LARGEST_GROWTH * first {
@@ -71,18 +72,21 @@ fn particles() -> Result<(), Failure> {
 
 fn tracker() -> Result<(), Failure> {
     let program = process::build("release", "--example", "cost")?;
-    let both = |part: &'static str, period_us: u32| {
-        let period = period_us.to_string();
-        let cost = |setting: &str| count(&program, [setting, part, period.as_str()]);
-        Ok::<_, Failure>((part, cost("default")?, cost("documented")?))
-    };
+    let phases = PERIODS_US.iter().flat_map(|&period_us| ["swinging", "standing"].map(|part| (part, period_us)));
+    let wanted = phases.chain(["prediction", "correction"].map(|part| (part, PERIODS_US[0])));
+    let wanted = wanted.flat_map(|(part, period_us)| SETTINGS.map(|setting| (setting, part, period_us))).collect();
+    let costs = together::each(wanted, together::processors(), |(setting, part, period_us): (&str, &str, u32)| {
+        Ok((part, count(&program, [setting, part, &period_us.to_string()])?))
+    })?;
+    let mut columns = costs.chunks_exact(SETTINGS.len()).map(|costs| (costs[0].0, costs[0].1, costs[1].1));
+    let mut next = || columns.next().expect("as many were counted as are wanted");
     for period_us in PERIODS_US {
-        let (swinging, standing) = (both("swinging", period_us)?, both("standing", period_us)?);
+        let (swinging, standing) = (next(), next());
         let mean = ("mean", swinging.1.and(standing.1), swinging.2.and(standing.2));
         let title = format!("instructions for each IMU sample at {} Hz (x86-64)", 1_000_000 / period_us);
         println!("{}", cost::table(&title, &[swinging, standing, mean]));
     }
-    let steps = [both("prediction", PERIODS_US[0])?, both("correction", PERIODS_US[0])?];
+    let steps = [next(), next()];
     println!("{}", cost::table("instructions for each step of the filter (x86-64)", &steps));
     let (_, default, documented) = steps[0];
     let share = default.mean() / documented.mean();
