@@ -37,7 +37,7 @@ pub fn start(args: &Beacons, text: &str, building: &Building, clock: Clock) -> R
         (None, false) => return Ok((follow::start::parse(building, text)?, Micros(i64::MIN))),
     };
     let mut readings: Vec<Reading> = Vec::new();
-    for (index, line) in source.text()?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+    for (index, line) in source.text("beacons")?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let wrong = |why| Error::new(format!("{source}, line {}: {why}", index + 1));
         readings.push(beacon::parse(line, clock).map_err(wrong)?);
     }

@@ -164,6 +164,8 @@ fn a_walk_begins_at_the_entrance_whose_beacon_is_loud() {
     heard("{\"time_us\":0,\"beacon\":\"40\"}\n");
     assert!(refused(folder, &by_beacon).contains("heard.jsonl, line 1: missing field `rssi_dbm`"));
     assert!(refused(folder, &begin).contains("expected --beacons FILE"));
+    let missing = [&begin[..], &["--beacons", "none.jsonl"]].concat();
+    assert!(refused(folder, &missing).contains("beacons none.jsonl: "));
     let unknown = ["graph", "walk.mcap", "--building", "twin.geojson", "--start", "beacon", "--beacons", "heard.jsonl"];
     heard("{\"time_us\":0,\"beacon\":\"40\",\"rssi_dbm\":-40}\n");
     assert!(refused(folder, &unknown).contains("no entrance of the building has a beacon"));

@@ -68,7 +68,7 @@ impl Incoming {
 
     /// Reads all lines.
     pub fn read(&mut self, source: &Source, clock: Clock) -> Result<(), Error> {
-        for (index, line) in source.text()?.lines().enumerate() {
+        for (index, line) in source.text(source::FIXES)?.lines().enumerate() {
             if let Some(fix) = self.line(line, &format!("{source}, line {}", index + 1), clock) {
                 self.fixes.push(fix);
             }

@@ -48,26 +48,29 @@ impl fmt::Display for Source {
     }
 }
 
+/// What [`Source::stream`] reads.
+pub const FIXES: &str = "fixes";
+
 impl Source {
-    fn refused(&self, error: &io::Error) -> Error {
-        Error::new(format!("fixes {self}: {error}"))
+    fn refused(&self, what: &str, error: &io::Error) -> Error {
+        Error::new(format!("{what} {self}: {error}"))
     }
 
-    /// All there is.
-    pub fn text(&self) -> Result<String, Error> {
+    /// All there is of `what` is read from it.
+    pub fn text(&self, what: &str) -> Result<String, Error> {
         let mut text = String::new();
         match self {
             Self::Input => io::stdin().read_to_string(&mut text).map(|_| text),
             Self::File(path) => std::fs::read_to_string(path),
             Self::Udp(_) => Err(io::Error::other("a walk that is over hears no datagrams; expected a file or '-'")),
         }
-        .map_err(|error| self.refused(&error))
+        .map_err(|error| self.refused(what, &error))
     }
 
     /// Begins to read, beside the program.
     pub fn stream(&self) -> Result<Stream, Error> {
         let (lines, heard) = sync_channel(WAITING);
-        let refused = |error| self.refused(&error);
+        let refused = |error| self.refused(FIXES, &error);
         match self {
             Self::Input => beside(move || read(io::stdin().lock(), &lines)),
             Self::File(path) => {
@@ -154,7 +157,7 @@ mod tests {
         let path = folder.path().join("fixes.jsonl");
         std::fs::write(&path, "one\ntwo\n").unwrap();
         let source: Source = path.to_str().unwrap().parse().unwrap();
-        assert_eq!(source.text().unwrap(), "one\ntwo\n");
+        assert_eq!(source.text(FIXES).unwrap(), "one\ntwo\n");
         assert_eq!(first(&source.stream().unwrap(), 2), ["one", "two"]);
         // A free port, which nobody takes in the next moment.
         let place = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
@@ -168,7 +171,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_read_is_told() {
-        let told = |text: &str| text.parse::<Source>().unwrap().text().unwrap_err().to_string();
+        let told = |text: &str| text.parse::<Source>().unwrap().text(FIXES).unwrap_err().to_string();
         assert!(told("/nowhere/fixes.jsonl").starts_with("fixes /nowhere/fixes.jsonl: "));
         assert!(told("udp:127.0.0.1:9").contains("expected a file or '-'"));
         let told = "udp:nowhere".parse::<Source>().unwrap().stream().unwrap_err().to_string();
