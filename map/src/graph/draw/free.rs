@@ -10,6 +10,8 @@ const MARGIN_M: f64 = 0.5;
 const MOST_CELLS: f64 = 4e6;
 /// From the middle of a door one looks so far for a free place, and passes its frame. **Units:** m.
 const GATE_M: (f64, f64) = (1.2, 0.3);
+/// Who goes through a door obliquely keeps so far from its sides: through a narrow one nobody does. **Units:** m.
+const JAMB_M: f64 = 0.6;
 /// From a door people go straight on so far, if the middle of what is behind it is not nearer. **Units:** m.
 pub const STRAIGHT_ON_M: f64 = 2.5;
 /// And from a landing. **Units:** m.
@@ -29,6 +31,8 @@ pub struct Free {
     pub free: Vec<bool>,
     /// Distance from walls and doors: the middle of a corridor is where it is largest. **Units:** m.
     pub clearance: Vec<f32>,
+    /// Whether one gets through there without standing there: wide doors.
+    through: Vec<bool>,
     /// For each door that leads somewhere the cell in its middle.
     pub gates: Vec<usize>,
     /// The cells straight on from the doors to the middle of what is behind.
@@ -49,9 +53,9 @@ impl Free {
         let size = [0, 1].map(|axis| high[axis] + MARGIN_M - low[axis]);
         let side = cell_m.max((size[0] * size[1] / MOST_CELLS).sqrt());
         let [columns, rows] = size.map(|size| (size / side).ceil() as usize + 1);
-        let (free, clearance) = (vec![false; columns * rows], Vec::new());
-        let mut grid =
-            Self { angle, low, side, columns, rows, free, clearance, gates: Vec::new(), straight_on: Vec::new() };
+        let (free, through) = (vec![false; columns * rows], vec![false; columns * rows]);
+        let (clearance, gates, straight_on) = (Vec::new(), Vec::new(), Vec::new());
+        let mut grid = Self { angle, low, side, columns, rows, free, clearance, through, gates, straight_on };
 
         let mut lines: Vec<bool> = vec![false; grid.count()];
         for line in floor.walls.iter().chain(floor.doors.iter().map(|door| &door.line)) {
@@ -146,12 +150,12 @@ impl Free {
         found.map(|(_, cell)| cell)
     }
 
-    /// Whether one gets from one point to another straight on, over free cells alone. **Frame:** building.
+    /// Whether one gets from one point to another straight on, over free cells and through wide doors alone. **Frame:** building.
     pub fn sees(&self, from: Point, to: Point) -> bool {
         let count = (geometry::distance(from, to) / (0.5 * self.side)).ceil().max(1.0) as usize;
         (0..=count).all(|step| {
             let point = geometry::between(from, to, step as f64 / count as f64);
-            self.cell(point).is_some_and(|cell| self.free[cell])
+            self.cell(point).is_some_and(|cell| self.free[cell] || self.through[cell])
         })
     }
 
@@ -220,40 +224,46 @@ impl Free {
         inside
     }
 
-    /// Makes a way of free cells through a door, at a part of its width, and tells whether both sides of it lead somewhere.
+    /// The cells across a door, so far along it, from its middle line to the first free ones on both sides of it; nothing where
+    /// none is or where a wall stands between. **Units:** m.
+    fn leaf(&self, door: &Segment, along_m: f64, walls: &[Segment]) -> Option<Vec<usize>> {
+        let steps = (GATE_M.0 / (0.5 * self.side)) as usize;
+        let mut cells = Vec::new();
+        for sign in [1.0, -1.0] {
+            let at = |step: usize| across(door, along_m, sign * step as f64 * 0.5 * self.side);
+            let is_free = |step: &usize| {
+                *step as f64 * 0.5 * self.side >= GATE_M.1 && self.cell(at(*step)).is_some_and(|cell| self.free[cell])
+            };
+            let end = (0..=steps).find(is_free)?;
+            let leaf = [at(0), at(end)];
+            if walls.iter().any(|wall| geometry::crossing(&leaf, wall).is_some()) {
+                return None;
+            }
+            cells.extend((0..=end).filter_map(|step| self.cell(at(step))));
+        }
+        Some(cells)
+    }
+
+    /// Makes a way of free cells through a door, at a part of its width, and tells whether both sides of it lead somewhere. A wide
+    /// one can be looked through obliquely, too.
     fn open(&mut self, door: &Segment, part: f64, walls: &[Segment]) -> bool {
         let length = geometry::length(door);
         if length < 1e-6 {
             return false;
         }
-        let middle = geometry::between(door[0], door[1], part);
-        let across = [-(door[1][1] - door[0][1]) / length, (door[1][0] - door[0][0]) / length];
-        let steps = (GATE_M.0 / (0.5 * self.side)) as usize;
-        let mut cells = Vec::new();
-        for sign in [1.0, -1.0] {
-            let at = |step: usize| {
-                let far = sign * step as f64 * 0.5 * self.side;
-                [middle[0] + far * across[0], middle[1] + far * across[1]]
-            };
-            let is_free = |step: &usize| {
-                *step as f64 * 0.5 * self.side >= GATE_M.1 && self.cell(at(*step)).is_some_and(|cell| self.free[cell])
-            };
-            let Some(end) = (0..=steps).find(is_free) else { return false };
-            let leaf = [at(0), at(end)];
-            if walls.iter().any(|wall| geometry::crossing(&leaf, wall).is_some()) {
-                return false;
-            }
-            cells.extend((0..=end).filter_map(|step| self.cell(at(step))));
+        let Some(cells) = self.leaf(door, part * length, walls) else { return false };
+        let beside = (0..).map(|step| JAMB_M + 0.5 * self.side * f64::from(step));
+        let beside = beside.take_while(|along_m| *along_m <= length - JAMB_M);
+        let doorway: Vec<usize> = beside.filter_map(|along_m| self.leaf(door, along_m, walls)).flatten().collect();
+        for cell in doorway {
+            self.through[cell] = true;
         }
         for &cell in &cells {
             self.free[cell] = true;
         }
         self.gates.extend(cells.first());
         for sign in [1.0, -1.0] {
-            let at = |step: usize| {
-                let far = sign * step as f64 * 0.5 * self.side;
-                self.cell([middle[0] + far * across[0], middle[1] + far * across[1]])
-            };
+            let at = |step: usize| self.cell(across(door, part * length, sign * step as f64 * 0.5 * self.side));
             let (mut wide, mut line) = (0.0, Vec::new());
             for cell in (0..(STRAIGHT_ON_M / (0.5 * self.side)) as usize).map_while(at) {
                 if !self.free[cell] || self.clearance[cell] < wide {
@@ -355,6 +365,13 @@ fn on_level(way: &[[f64; 3]], height_m: f64, place: Point) -> bool {
     nearest.is_none_or(|pair| pair.iter().all(|point| (point[2] - height_m).abs() < 0.1))
 }
 
+/// The place so far along a door and so far beside it. **Units:** m.
+fn across(door: &Segment, along_m: f64, beside_m: f64) -> Point {
+    let length = geometry::length(door);
+    let along = [0, 1].map(|axis| (door[1][axis] - door[0][axis]) / length);
+    [door[0][0] + along_m * along[0] - beside_m * along[1], door[0][1] + along_m * along[1] + beside_m * along[0]]
+}
+
 /// A point turned about the origin. **Units:** rad.
 fn turned([x, y]: Point, angle: f64) -> Point {
     let (sin, cos) = angle.sin_cos();
@@ -454,5 +471,26 @@ mod tests {
         let free = Free::of(&building, &building.floors[0], 0.2, 0.1);
         let is = |x: f64, y: f64| free.cell([x, y]).is_some_and(|cell| free.free[cell]);
         assert!(is(2.0, 2.0) && is(6.0, 2.0) && !is(8.4, 2.0) && !is(-0.4, 1.0));
+    }
+    /// Outlines of rooms leave out a wall of 0.3 m between them, as plans of real buildings do.
+    #[test]
+    fn one_sees_obliquely_through_a_wide_door_in_a_thick_wall_and_not_through_a_narrow_one() {
+        let sees = |wide: f64, [from, to]: [Point; 2]| {
+            let outline = |x: f64| vec![[x, 0.0], [x + 4.0, 0.0], [x + 4.0, 4.0], [x, 4.0]];
+            let rooms = [0.0, 4.3].map(|x| Room { name: x.to_string(), usage: None, outline: outline(x) }).to_vec();
+            let ends = [2.0 - 0.5 * wide, 2.0 + 0.5 * wide];
+            let faces = [4.0, 4.3].map(|x| [[[x, 0.0], [x, ends[0]]], [[x, ends[1]], [x, 4.0]]]);
+            let doors = vec![Door { line: ends.map(|y| [4.15, y]), name: None }];
+            let floor = Floor { walls: faces.concat(), doors, rooms, ..Floor::default() };
+            let building = Building { floors: vec![floor], ..Building::default() };
+            let free = Free::of(&building, &building.floors[0], 0.2, 0.1);
+            assert_eq!(free.gates.len(), 1);
+            free.sees(from, to) && free.sees(to, from)
+        };
+        let oblique = [[3.0, 1.6], [5.3, 2.6]];
+        assert!(sees(2.4, oblique) && !sees(1.0, oblique));
+        assert!([2.4, 1.0].iter().all(|&wide| sees(wide, [[3.0, 2.0], [5.3, 2.0]])));
+        // Not along its sides: nobody goes there.
+        assert!(!sees(2.4, [[3.0, 1.1], [5.3, 1.1]]));
     }
 }
