@@ -131,7 +131,7 @@ impl Others {
                 }
                 (_, _, None) => (Vec::new(), "waits until place and direction are known".to_owned()),
                 (Beside::Documented, Some(graph), Some(anchor)) => {
-                    let way = graph.documented(of.steps, anchor);
+                    let way = graph.documented(of.steps, anchor, epoch);
                     (way.places, way.last.map_or_else(|| "waits for a step".into(), |last| last.to_string()))
                 }
                 (Beside::Matcher, Some(graph), Some(anchor)) => graph.matched(of, anchor, epoch),

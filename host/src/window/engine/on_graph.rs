@@ -26,6 +26,7 @@ pub struct OnGraph {
     building: Arc<Building>,
     /// Lengths of steps are measured, not guessed.
     measured: bool,
+    documented: Option<Documented>,
     matched: Option<Matched>,
 }
 
@@ -36,6 +37,18 @@ pub struct Way {
     pub places: Vec<[f64; 3]>,
     /// What was decided at the last step.
     pub last: Option<Decision>,
+}
+
+/// The document's tracker in the middle of a walk, which goes on with the next step.
+#[derive(Debug)]
+struct Documented {
+    anchor: Anchor,
+    epoch: usize,
+    /// Strides that were taken in, and the direction of the last that had one. **Units:** rad.
+    strides: usize,
+    heading: f64,
+    tracker: Tracker<Arc<Graph>>,
+    way: Way,
 }
 
 /// The matcher in the middle of a walk, which goes on with the next step.
@@ -60,35 +73,45 @@ impl OnGraph {
         if building.graph.is_none() {
             building.graph = Some(draw(&building, &draw::Parameters::default()));
         }
-        Ok(Self { graph: Arc::new(Graph::of(&building)?), building: Arc::new(building), measured, matched: None })
+        let (graph, building) = (Arc::new(Graph::of(&building)?), Arc::new(building));
+        Ok(Self { graph, building, measured, documented: None, matched: None })
     }
 
-    /// Follows a track as the document does, from where its place and direction became known.
-    pub fn documented(&self, track: &Track, anchor: &Anchor) -> Way {
-        let strides = strides(track, anchor);
-        let Some((first, mut heading)) = first(&strides) else { return Way::default() };
-        let Some((edge, along_m)) = start(&self.graph, anchor.floor, [first[0], first[1]], heading) else {
-            return Way::default();
+    /// Follows a track as the document does, from where its place and direction became known. Of a walk that has only become
+    /// longer the new steps alone are looked at. `epoch` is another number whenever it is another walk.
+    pub fn documented(&mut self, track: &Track, anchor: &Anchor, epoch: usize) -> Way {
+        let goes_on = |run: &Documented| {
+            run.anchor == *anchor && run.epoch == epoch && anchor.since + run.strides < track.stances.len()
         };
-        let documented = Parameters::documented();
-        let parameters = if self.measured { Parameters { step_m: 0.0, ..documented } } else { documented };
-        let mut tracker = Tracker::new(&self.graph, &parameters, edge, along_m);
-        if let Some(floors) = Floors::new(&self.building, anchor.floor) {
-            tracker = tracker.with_barometer(floors);
-        }
-        let mut way = Way::default();
-        for stride in &strides {
-            let (length, direction) = along(stride);
+        let run = self.documented.take().filter(goes_on).or_else(|| self.documented_anew(track, anchor, epoch));
+        let Some(mut run) = run else { return Way::default() };
+        for stride in strides(track, anchor, run.strides) {
+            run.strides += 1;
+            let (length, direction) = along(&stride);
             if length <= SHORTEST_M {
                 continue;
             }
-            let decision = tracker.step(wrapped(direction - heading), length, stride.1[2] - stride.0[2]);
-            heading = direction;
+            let decision = run.tracker.step(wrapped(direction - run.heading), length, stride.1[2] - stride.0[2]);
+            run.heading = direction;
             let [x, y] = decision.place;
-            way.places.push([x, y, self.height(&decision)]);
-            way.last = Some(decision);
+            run.way.places.push([x, y, self.height(&decision)]);
+            run.way.last = Some(decision);
         }
+        let way = run.way.clone();
+        self.documented = Some(run);
         way
+    }
+
+    fn documented_anew(&self, track: &Track, anchor: &Anchor, epoch: usize) -> Option<Documented> {
+        let (place, heading) = first(track, anchor)?;
+        let (edge, along_m) = start(&self.graph, anchor.floor, [place[0], place[1]], heading)?;
+        let documented = Parameters::documented();
+        let parameters = if self.measured { Parameters { step_m: 0.0, ..documented } } else { documented };
+        let mut tracker = Tracker::new(self.graph.clone(), &parameters, edge, along_m);
+        if let Some(floors) = Floors::new(&self.building, anchor.floor) {
+            tracker = tracker.with_barometer(floors);
+        }
+        Some(Documented { anchor: *anchor, epoch, strides: 0, heading, tracker, way: Way::default() })
     }
 
     fn height(&self, decision: &Decision) -> f64 {
@@ -133,7 +156,7 @@ impl OnGraph {
     }
 
     fn begun(&self, track: &Track, anchor: &Anchor, epoch: usize) -> Option<Matched> {
-        let (place, heading) = first(&strides(track, anchor))?;
+        let (place, heading) = first(track, anchor)?;
         let parameters = if self.measured { matcher::Parameters::default() } else { matcher::Parameters::phone() };
         let place = matcher::Place {
             floor: anchor.floor,
@@ -153,10 +176,15 @@ impl OnGraph {
     }
 }
 
-/// From one stance to the next, in the building. **Units:** m.
-fn strides(track: &Track, anchor: &Anchor) -> Vec<([f64; 3], [f64; 3])> {
-    let stances = track.stances.get(anchor.since..).unwrap_or_default();
-    stances.windows(2).map(|pair| (anchor.apply(pair[0].position), anchor.apply(pair[1].position))).collect()
+/// From one stance to the next, in the building, after so many of them. **Units:** m.
+fn strides<'a>(
+    track: &'a Track,
+    anchor: &Anchor,
+    after: usize,
+) -> impl Iterator<Item = ([f64; 3], [f64; 3])> + use<'a> {
+    let anchor = *anchor;
+    let stances = track.stances.get(anchor.since + after..).unwrap_or_default();
+    stances.windows(2).map(move |pair| (anchor.apply(pair[0].position), anchor.apply(pair[1].position)))
 }
 
 /// Length and direction. **Units:** m, rad.
@@ -165,9 +193,9 @@ fn along((from, to): &([f64; 3], [f64; 3])) -> (f64, f64) {
     (x.hypot(y), y.atan2(x))
 }
 
-/// Where the first that has a direction begins, and that.
-fn first(strides: &[([f64; 3], [f64; 3])]) -> Option<([f64; 3], f64)> {
-    strides.iter().find(|stride| along(stride).0 > SHORTEST_M).map(|stride| (stride.0, along(stride).1))
+/// Where the first stride that has a direction begins, and that.
+fn first(track: &Track, anchor: &Anchor) -> Option<([f64; 3], f64)> {
+    strides(track, anchor, 0).find(|stride| along(stride).0 > SHORTEST_M).map(|stride| (stride.0, along(&stride).1))
 }
 
 #[cfg(test)]
@@ -184,7 +212,7 @@ mod tests {
     #[test]
     fn a_walk_along_a_corridor_stays_on_its_edges() {
         let building = generate::twin(2);
-        let on = OnGraph::of(&building, true).unwrap();
+        let mut on = OnGraph::of(&building, true).unwrap();
         // The corridor of the twin leads east at y = 7.5; the steps know nothing of that.
         let stance = |index: i32| Stance {
             start: Micros(0),
@@ -195,14 +223,14 @@ mod tests {
         let track = Track { stances: (0..10).map(stance).collect(), ..Track::default() };
         let anchor =
             Anchor { yaw: -std::f64::consts::FRAC_PI_2, shift: Vector3::new(3.0, 7.2, 0.0), floor: 0, since: 2 };
-        let way = on.documented(&track, &anchor);
+        let way = on.documented(&track, &anchor, 1);
         assert_eq!(way.places.len(), 7);
         let [x, y, z] = way.places[6];
         // From the third stance, at 5.4 m, seven steps; the tracker puts somebody beside an edge onto it.
         assert!((x - 13.8).abs() < 1.5 && (y - 7.5).abs() < 1.0 && z == 0.0, "{x} {y} {z}");
         let last = way.last.unwrap();
         assert!(last.delta.abs() < 0.3 && matches!(last.case.number(), Some(1 | 4)), "{last}");
-        assert!(on.documented(&Track::default(), &anchor).places.is_empty());
+        assert!(on.documented(&Track::default(), &anchor, 1).places.is_empty());
     }
 
     fn of<'a>(steps: &'a Track, fusion: Option<&'a Fusion>) -> Followed<'a> {
@@ -210,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn the_matcher_goes_on_with_the_next_step_as_if_it_had_begun_anew() {
+    fn both_go_on_with_the_next_step_as_if_they_had_begun_anew() {
         let building = generate::twin(2);
         let walk =
             Walk::through(&building, &["W02", "hall", "E03"], &Walker { person: Person::default(), seed: 3 }).unwrap();
@@ -231,7 +259,14 @@ mod tests {
         for count in [5, 6, 20, walk.steps.len()] {
             let part = Track::of_steps(&walk.steps[..count]);
             piecewise.matched(&of(&part, Some(&fusion)), &anchor, 1);
+            piecewise.documented(&part, &anchor, 1);
         }
+        let documented = |on: &mut OnGraph, epoch| {
+            let way = on.documented(&whole, &anchor, epoch);
+            (way.places, way.last.map(|last| last.to_string()))
+        };
+        let found = documented(&mut piecewise, 1);
+        assert!(found.0.len() > 20 && found == documented(&mut OnGraph::of(&building, true).unwrap(), 7));
         let at_once = |epoch| {
             let mut on = OnGraph::of(&building, true).unwrap();
             on.matched(&of(&whole, None), &anchor, epoch)

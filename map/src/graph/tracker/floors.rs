@@ -8,6 +8,7 @@ use super::Tracker;
 use crate::building::Building;
 use crate::building::geometry::{self, Point};
 use crate::graph::{EdgeId, EdgeKind, Graph, NodeId};
+use std::borrow::Borrow;
 
 /// By what a floor was changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,12 +85,12 @@ impl Floors {
     }
 }
 
-impl Tracker<'_> {
+impl<G: Borrow<Graph>> Tracker<G> {
     /// Whether an edge may be walked on: level ones only on the floor that the barometer tells.
     pub(super) fn is_open(&self, id: EdgeId) -> bool {
         let Some(floors) = &self.floors else { return true };
-        let edge = self.graph.edge(id);
-        let node = self.graph.node(edge.from);
+        let edge = self.graph().edge(id);
+        let node = self.graph().node(edge.from);
         let on_floor = floors.heights.iter().find(|(_, height)| (height - node.height_m).abs() < LEVEL_M);
         edge.kind != EdgeKind::Level || on_floor.is_none_or(|(number, _)| *number == floors.here)
     }
@@ -97,15 +98,15 @@ impl Tracker<'_> {
     /// Whether an edge belongs to stairs from the floor below: the document draws stairs on both floors that they join.
     pub(super) fn climbs_to(&self, id: EdgeId, floor: i32) -> bool {
         let Some(floors) = &self.floors else { return false };
-        let edge = self.graph.edge(id);
-        let [from, to] = [edge.from, edge.to].map(|node| self.graph.node(node));
+        let edge = self.graph().edge(id);
+        let [from, to] = [edge.from, edge.to].map(|node| self.graph().node(node));
         let on_floor = floors.heights.iter().any(|(_, height)| (height - from.height_m).abs() < LEVEL_M);
         (edge.kind == EdgeKind::Stairs || !on_floor) && floors.below(floor) == Some(from.floor.min(to.floor))
     }
 
     /// Begins anew on the new floor (Graph, 6.11).
     pub(super) fn change_floor(&mut self, change: Change) {
-        let place = self.graph.on(self.edge, self.along_m);
+        let place = self.graph().on(self.edge, self.along_m);
         let heading = self.heading();
         let begin = match change.by {
             By::Elevator => self.out_of_elevator(change.to, place, heading),
@@ -116,7 +117,7 @@ impl Tracker<'_> {
         self.searched = None;
         self.by_turn = false;
         if edge != self.edge {
-            self.turned_at = self.graph.edge(edge).from;
+            self.turned_at = self.graph().edge(edge).from;
             self.trail = vec![edge];
             self.reach(edge);
         }
@@ -128,7 +129,7 @@ impl Tracker<'_> {
 
     /// The edge that leaves the elevator on a floor nearest to a place; by the heading where it has two doors.
     fn out_of_elevator(&self, floor: i32, place: Point, heading: f64) -> Option<(EdgeId, f64)> {
-        let graph = self.graph;
+        let graph = self.graph();
         let is_cabin = |&node: &NodeId| {
             graph.node(node).floor == floor && graph.leaving(node).any(|id| graph.edge(id).kind == EdgeKind::Elevator)
         };
@@ -141,7 +142,7 @@ impl Tracker<'_> {
 
     /// Where on the stairs between two floors somebody is.
     fn on_stairs(&self, change: Change, place: Point, heading: f64) -> Option<(EdgeId, f64)> {
-        let graph = self.graph;
+        let graph = self.graph();
         let floors = self.floors.as_ref()?;
         let heights = [change.from, change.to].map(|floor| floors.height_of(floor));
         let up = heights[1] > heights[0];
@@ -179,8 +180,8 @@ impl Tracker<'_> {
 
     /// How far along an edge a place lies. **Units:** m.
     pub(super) fn projected(&self, id: EdgeId, place: Point) -> f64 {
-        let [from, _] = self.graph.ends(id);
-        let (sin, cos) = self.graph.edge(id).direction.sin_cos();
+        let [from, _] = self.graph().ends(id);
+        let (sin, cos) = self.graph().edge(id).direction.sin_cos();
         (place[0] - from[0]) * cos + (place[1] - from[1]) * sin
     }
 }

@@ -25,6 +25,7 @@ pub use variance::Variance;
 
 use super::{EdgeId, EdgeKind, Graph, NodeId};
 use crate::building::geometry::wrapped;
+use std::borrow::Borrow;
 use std::f64::consts::PI;
 
 /// A shorter edge has no direction. **Units:** m.
@@ -40,8 +41,8 @@ struct Held {
 
 /// Follows somebody on a graph.
 #[derive(Clone, Debug)]
-pub struct Tracker<'a> {
-    graph: &'a Graph,
+pub struct Tracker<G> {
+    graph: G,
     parameters: Parameters,
     edge: EdgeId,
     /// Along the edge. **Units:** m.
@@ -67,9 +68,10 @@ pub struct Tracker<'a> {
     history: matching::History,
 }
 
-impl<'a> Tracker<'a> {
+impl<G: Borrow<Graph>> Tracker<G> {
     /// Somebody begins so far along an edge, in its direction. **Units:** m.
-    pub fn new(graph: &'a Graph, parameters: &Parameters, edge: EdgeId, along_m: f64) -> Self {
+    pub fn new(graph: G, parameters: &Parameters, edge: EdgeId, along_m: f64) -> Self {
+        let turned_at = graph.borrow().edge(edge).from;
         let mut begun = Self {
             graph,
             parameters: *parameters,
@@ -80,7 +82,7 @@ impl<'a> Tracker<'a> {
             behind_end: false,
             half_turned: false,
             by_turn: false,
-            turned_at: graph.edge(edge).from,
+            turned_at,
             trail: vec![edge],
             searched: None,
             variance: Variance::default(),
@@ -89,6 +91,10 @@ impl<'a> Tracker<'a> {
         };
         begun.history = matching::History::begin(begun.as_turn());
         begun
+    }
+
+    fn graph(&self) -> &Graph {
+        self.graph.borrow()
     }
 
     /// Changes floors by the barometer, and by nothing else. Without this floors change where the edges of stairs lead.
@@ -151,13 +157,13 @@ impl<'a> Tracker<'a> {
         decision.window = self.held.len();
         decision.edge = self.edge;
         decision.along_m = self.along_m;
-        decision.place = self.graph.on(self.edge, self.along_m);
+        decision.place = self.graph().on(self.edge, self.along_m);
         decision.sigma_m = self.variance.sigma_m();
         decision
     }
 
     fn length(&self, measured_m: f64) -> f64 {
-        match self.graph.edge(self.edge).kind {
+        match self.graph().edge(self.edge).kind {
             EdgeKind::Stairs => self.parameters.stairs_step_m,
             _ if self.parameters.step_m > 0.0 => self.parameters.step_m,
             _ => measured_m,
@@ -166,7 +172,7 @@ impl<'a> Tracker<'a> {
 
     /// Of the edge plus the deviation. **Units:** rad.
     fn heading(&self) -> f64 {
-        self.graph.edge(self.edge).direction + self.delta
+        self.graph().edge(self.edge).direction + self.delta
     }
 
     fn hold(&mut self, length_m: f64) {
@@ -205,7 +211,7 @@ impl<'a> Tracker<'a> {
             return Moved::On;
         }
         decision.case = Case::HalfTurn;
-        let edge = *self.graph.edge(self.edge);
+        let edge = *self.graph().edge(self.edge);
         self.along_m = (edge.length_m - self.along_m).clamp(0.0, edge.length_m);
         self.reach(edge.back);
         self.held.clear();
@@ -229,7 +235,7 @@ impl<'a> Tracker<'a> {
             self.lay(length_m, length_m);
             return Moved::On;
         }
-        let edge = *self.graph.edge(self.edge);
+        let edge = *self.graph().edge(self.edge);
         let to_end = (edge.length_m - self.along_m).max(0.0);
         let at_end = self.behind_end || to_end - self.parameters.end_favour_m <= self.along_m;
         let node = if at_end { edge.to } else { edge.from };
@@ -260,7 +266,7 @@ impl<'a> Tracker<'a> {
 
     /// Case 4 (Graph, 6.9, figure 6.27): a step would end so far along the edge, beyond its end.
     fn beyond(&mut self, along_m: f64, length_m: f64, decision: &mut Decision) {
-        let edge = *self.graph.edge(self.edge);
+        let edge = *self.graph().edge(self.edge);
         // Decision viii: whether the position before was on the edge.
         let limit = if self.behind_end { self.parameters.fit_deg } else { self.parameters.ahead_deg };
         decision.limit = limit.to_radians();
@@ -297,7 +303,7 @@ impl<'a> Tracker<'a> {
     fn turn_onto(&mut self, edge: EdgeId, metres: f64, length_m: f64) {
         self.held.clear();
         self.searched = None;
-        self.turned_at = self.graph.edge(edge).from;
+        self.turned_at = self.graph().edge(edge).from;
         self.trail = vec![edge];
         self.along_m = 0.0;
         self.reach(edge);
@@ -306,7 +312,7 @@ impl<'a> Tracker<'a> {
         self.variance = Variance::default();
         if self.parameters.search == SearchBy::MapMatching {
             let node = self.turned_at;
-            let turn = matching::Turn { node, place: self.graph.node(node).place, ..self.as_turn() };
+            let turn = matching::Turn { node, place: self.graph().node(node).place, ..self.as_turn() };
             self.history.turned(turn, &self.parameters.matching);
         }
     }
@@ -314,10 +320,10 @@ impl<'a> Tracker<'a> {
     /// The edges that leave a node on foot, by their angle to a heading.
     fn candidates(&self, node: NodeId, heading: f64) -> Vec<Candidate> {
         let walked = |id: &EdgeId| {
-            let edge = self.graph.edge(*id);
+            let edge = self.graph().edge(*id);
             edge.kind != EdgeKind::Elevator && edge.length_m >= SHORTEST_M && self.is_open(*id)
         };
-        let on_foot = self.graph.leaving(node).filter(walked);
+        let on_foot = self.graph().leaving(node).filter(walked);
         let candidate = |edge: EdgeId| Candidate { edge, angle: self.angle(edge, heading) };
         let mut candidates: Vec<Candidate> = on_foot.map(candidate).collect();
         candidates.sort_by(|a, b| a.angle.total_cmp(&b.angle).then(a.edge.cmp(&b.edge)));
@@ -326,12 +332,12 @@ impl<'a> Tracker<'a> {
 
     /// Between an edge and a heading (Graph, 6.9). **Units:** rad.
     fn angle(&self, edge: EdgeId, heading: f64) -> f64 {
-        wrapped(self.graph.edge(edge).direction - heading).abs()
+        wrapped(self.graph().edge(edge).direction - heading).abs()
     }
 
     fn end(&self) -> f64 {
         // A position that rounding has put beyond the end is on the edge.
-        self.graph.edge(self.edge).length_m + 1e-9
+        self.graph().edge(self.edge).length_m + 1e-9
     }
 
     /// Goes on along the edge; steps that do not fit onto it go on onto those that continue it, and those that fit onto
@@ -339,7 +345,7 @@ impl<'a> Tracker<'a> {
     fn lay(&mut self, metres: f64, length_m: f64) {
         self.along_m += metres;
         while self.along_m > self.end() {
-            let edge = *self.graph.edge(self.edge);
+            let edge = *self.graph().edge(self.edge);
             let ahead = self.candidates(edge.to, edge.direction);
             let next = ahead.first().filter(|next| next.angle < self.parameters.fit_deg.to_radians());
             let Some(next) = next.filter(|next| next.edge != edge.back) else {
@@ -355,7 +361,7 @@ impl<'a> Tracker<'a> {
 
     /// The error grows by some steps along the edge.
     fn spread(&mut self, steps: usize, length_m: f64) {
-        let direction = self.graph.edge(self.edge).direction;
+        let direction = self.graph().edge(self.edge).direction;
         for _ in 0..steps {
             self.variance = self.variance.step(direction, length_m, &self.parameters);
         }

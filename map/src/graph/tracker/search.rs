@@ -6,9 +6,10 @@ use super::matching::History;
 use super::{Floors, SearchBy, Tracker, Variance};
 use crate::building::geometry::{self, Point};
 use crate::graph::paths::{dijkstra, plan_length};
-use crate::graph::{EdgeId, EdgeKind};
+use crate::graph::{EdgeId, EdgeKind, Graph};
+use std::borrow::Borrow;
 
-impl Tracker<'_> {
+impl<G: Borrow<Graph>> Tracker<G> {
     /// Searches an edge for the steps that are held back. Without one they are held back further.
     pub(super) fn search(&mut self, length_m: f64, decision: &mut Decision) {
         if self.parameters.search == SearchBy::MapMatching && self.match_route(length_m, decision) {
@@ -18,16 +19,16 @@ impl Tracker<'_> {
         let heading = self.heading();
         let limit = self.parameters.search_deg.to_radians();
         let radius_m = self.parameters.search_sigmas * self.variance.sigma_m();
-        let own = self.graph.node(self.graph.edge(self.edge).from).floor;
+        let own = self.graph().node(self.graph().edge(self.edge).from).floor;
         let floor = self.floors.as_ref().map_or(own, Floors::here);
-        let start = |edge: EdgeId| self.graph.node(self.graph.edge(edge).from);
+        let start = |edge: EdgeId| self.graph().node(self.graph().edge(edge).from);
         let far = |edge: EdgeId| geometry::distance(start(edge).place, from);
         // Those since the last turn were wrong (figure 6.33).
         let passed =
-            |edge: EdgeId| self.trail.iter().any(|&passed| passed == edge || self.graph.edge(passed).back == edge);
-        let fitting = self.graph.edge_ids().filter(|&edge| {
+            |edge: EdgeId| self.trail.iter().any(|&passed| passed == edge || self.graph().edge(passed).back == edge);
+        let fitting = self.graph().edge_ids().filter(|&edge| {
             (start(edge).floor == floor || self.climbs_to(edge, floor))
-                && self.graph.edge(edge).kind != EdgeKind::Elevator
+                && self.graph().edge(edge).kind != EdgeKind::Elevator
                 && !passed(edge)
                 && self.is_open(edge)
                 && self.angle(edge, heading) < limit
@@ -43,11 +44,11 @@ impl Tracker<'_> {
             decision.case = Case::Waiting;
             return;
         };
-        let node = self.graph.edge(edge).from;
+        let node = self.graph().edge(edge).from;
         if local {
             // The way since the last turn was wrong: the shortest from there to the edge takes its place.
             decision.case = Case::LocalSearch;
-            let way = dijkstra(self.graph, self.turned_at, node, plan_length);
+            let way = dijkstra(self.graph(), self.turned_at, node, plan_length);
             self.trail = way.map_or_else(Vec::new, |way| way.edges);
             self.trail.push(edge);
         } else {
@@ -60,7 +61,7 @@ impl Tracker<'_> {
         self.held.clear();
         self.by_turn = false;
         self.reach(edge);
-        self.along_m = length_m.min(self.graph.edge(edge).length_m);
+        self.along_m = length_m.min(self.graph().edge(edge).length_m);
         self.spread(1, length_m);
         self.searched = Some((from, 0));
         if !local {
@@ -77,7 +78,7 @@ impl Tracker<'_> {
         {
             return from;
         }
-        self.held.iter().fold(self.graph.on(self.edge, self.along_m), |[x, y], held| {
+        self.held.iter().fold(self.graph().on(self.edge, self.along_m), |[x, y], held| {
             [x + held.length_m * held.heading.cos(), y + held.length_m * held.heading.sin()]
         })
     }

@@ -18,12 +18,12 @@ pub(super) fn edge(graph: &Graph, from: u32, to: u32) -> EdgeId {
 }
 
 /// Begins at node 0 towards node 1.
-fn tracker(graph: &Graph) -> Tracker<'_> {
+fn tracker(graph: &Graph) -> Tracker<&Graph> {
     Tracker::new(graph, &Parameters::documented(), edge(graph, 0, 1), 0.0)
 }
 
 /// Steps with these turns, in degrees; what was decided at the last.
-fn walk(tracker: &mut Tracker<'_>, turns: &[f64]) -> Decision {
+fn walk(tracker: &mut Tracker<&Graph>, turns: &[f64]) -> Decision {
     let mut last = None;
     for turn in turns {
         last = Some(tracker.step(turn.to_radians(), 0.0, 0.0));
@@ -311,7 +311,7 @@ fn two_floors() -> (Graph, Floors) {
 }
 
 /// Turns in degrees and rises.
-fn climb(tracker: &mut Tracker<'_>, steps: &[(f64, f64)]) -> Decision {
+fn climb(tracker: &mut Tracker<&Graph>, steps: &[(f64, f64)]) -> Decision {
     let mut last = None;
     for (turn, rise) in steps {
         last = Some(tracker.step(turn.to_radians(), 0.0, *rise));

@@ -28,7 +28,8 @@ use super::decision::{Case, Decision};
 use crate::alignment::Helmert;
 use crate::building::geometry::{self, Point};
 use crate::graph::paths::{self, plan_length};
-use crate::graph::{EdgeId, EdgeKind, NodeId};
+use crate::graph::{EdgeId, EdgeKind, Graph, NodeId};
+use std::borrow::Borrow;
 use std::fmt;
 
 /// The thresholds of map matching.
@@ -165,12 +166,12 @@ impl fmt::Display for Matching {
     }
 }
 
-impl Tracker<'_> {
+impl<G: Borrow<Graph>> Tracker<G> {
     /// The position as the begin of a reference track.
     pub(super) fn as_turn(&self) -> Turn {
-        let edge = self.graph.edge(self.edge);
-        let entry = self.graph.on(self.edge, self.along_m);
-        Turn { node: edge.from, place: self.graph.node(edge.from).place, entry, heading: edge.direction }
+        let edge = self.graph().edge(self.edge);
+        let entry = self.graph().on(self.edge, self.along_m);
+        Turn { node: edge.from, place: self.graph().node(edge.from).place, entry, heading: edge.direction }
     }
 
     /// Goes on at the end of the best route, if there is one.
@@ -185,7 +186,7 @@ impl Tracker<'_> {
         let Some(&last) = best.edges.last() else { return false };
         decision.case = Case::MapMatching;
         let along = self.projected(last, end);
-        let last_m = self.graph.edge(last).length_m;
+        let last_m = self.graph().edge(last).length_m;
         self.turned_at = reference.node;
         self.trail = best.edges;
         self.held.clear();
@@ -237,7 +238,7 @@ impl Tracker<'_> {
 
     /// The shortest routes from where the reference track begins to the nodes around its end.
     fn routes(&self, reference: &Reference, end: Point, thresholds: &Thresholds) -> Vec<Vec<EdgeId>> {
-        let graph = self.graph;
+        let graph = self.graph();
         let floor = graph.node(reference.node).floor;
         if self.floors.as_ref().is_some_and(|floors| floors.here() != floor) {
             return Vec::new();
@@ -273,7 +274,7 @@ impl Tracker<'_> {
 
     /// Of a route. **Units:** m.
     fn length_of(&self, edges: &[EdgeId]) -> f64 {
-        edges.iter().map(|&edge| self.graph.edge(edge).length_m).sum()
+        edges.iter().map(|&edge| self.graph().edge(edge).length_m).sum()
     }
 
     /// A route as so many equal steps.
@@ -283,11 +284,11 @@ impl Tracker<'_> {
         let (mut number, mut before) = (0, 0.0);
         for step in 0..=steps {
             let at = total * step as f64 / steps.max(1) as f64;
-            while number + 1 < edges.len() && at > before + self.graph.edge(edges[number]).length_m {
-                before += self.graph.edge(edges[number]).length_m;
+            while number + 1 < edges.len() && at > before + self.graph().edge(edges[number]).length_m {
+                before += self.graph().edge(edges[number]).length_m;
                 number += 1;
             }
-            points.push(self.graph.on(edges[number], at - before));
+            points.push(self.graph().on(edges[number], at - before));
         }
         points
     }

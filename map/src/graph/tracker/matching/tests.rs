@@ -14,18 +14,18 @@ fn two_corridors() -> Graph {
     graph(&places, &[[0, 1], [1, 2], [1, 3], [2, 6], [6, 4], [5, 6]])
 }
 
-fn by_matching(graph: &Graph) -> Tracker<'_> {
+fn by_matching(graph: &Graph) -> Tracker<&Graph> {
     let parameters = Parameters { search: SearchBy::MapMatching, ..Parameters::documented() };
     Tracker::new(graph, &parameters, edge(graph, 0, 1), 0.0)
 }
 
 /// Steps with these turns, in degrees; what was decided at the last.
-fn walk(tracker: &mut Tracker<'_>, turns: impl IntoIterator<Item = f64>) -> Decision {
+fn walk(tracker: &mut Tracker<&Graph>, turns: impl IntoIterator<Item = f64>) -> Decision {
     turns.into_iter().map(|turn| tracker.step(turn.to_radians(), 0.0, 0.0)).last().unwrap()
 }
 
 /// To the crossing, cleanly to the north, and along a wide arc to the east, which fits no edge: until the search.
-fn wide_arc(tracker: &mut Tracker<'_>) -> Decision {
+fn wide_arc(tracker: &mut Tracker<&Graph>) -> Decision {
     walk(tracker, [0.0; 17]);
     let turned = walk(tracker, [90.0]);
     assert_eq!(turned.case, Case::Turn, "{turned}");
