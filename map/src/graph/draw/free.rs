@@ -472,6 +472,7 @@ mod tests {
         let is = |x: f64, y: f64| free.cell([x, y]).is_some_and(|cell| free.free[cell]);
         assert!(is(2.0, 2.0) && is(6.0, 2.0) && !is(8.4, 2.0) && !is(-0.4, 1.0));
     }
+
     /// Outlines of rooms leave out a wall of 0.3 m between them, as plans of real buildings do.
     #[test]
     fn one_sees_obliquely_through_a_wide_door_in_a_thick_wall_and_not_through_a_narrow_one() {
