@@ -139,28 +139,32 @@ impl Ancestry {
         self.leaves.iter().map(spot).collect()
     }
 
-    /// The past of the particles for which `belongs` holds, from the oldest step.
-    pub fn past(&self, particles: &[Particle], belongs: impl Fn(&Particle) -> bool) -> Vec<PastPlace> {
-        let mut weights = vec![0.0_f64; self.nodes.len()];
-        for (particle, &leaf) in particles.iter().zip(&self.leaves) {
-            if belongs(particle) {
-                weights[leaf as usize] += f64::from(particle.weight);
-            }
-        }
-        let mut living: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        let mut dead = vec![false; self.nodes.len()];
-        self.free.iter().for_each(|&index| dead[index as usize] = true);
-        living.retain(|&index| !dead[index as usize]);
-        // Children before their parents, which gather their weights.
-        living.sort_unstable_by_key(|&index| std::cmp::Reverse((self.nodes[index as usize].step, index)));
+    /// The past of the particles for which `belongs` holds, or of every so many of them, from the oldest step.
+    pub fn past(&self, particles: &[Particle], every: usize, belongs: impl Fn(&Particle) -> bool) -> Vec<PastPlace> {
+        let mut weights = vec![0.0; self.nodes.len()];
         let mut past = Vec::new();
-        for same in living.chunk_by(|&a, &b| self.nodes[a as usize].step == self.nodes[b as usize].step) {
-            for &index in same {
-                if let Some(weight) = weights.get(self.nodes[index as usize].parent as usize).copied() {
-                    weights[self.nodes[index as usize].parent as usize] = weight + weights[index as usize];
+        let add = |weights: &mut [f64], nodes: &mut Vec<u32>, index: u32, weight: f64| {
+            if let Some(sum) = weights.get_mut(index as usize).filter(|_| weight > 0.0) {
+                if *sum == 0.0 {
+                    nodes.push(index);
                 }
+                *sum += weight;
             }
-            past.extend(self.mean(same, &weights));
+        };
+        // All of one step, from the last to the first; parents gather the weights of their children.
+        let mut nodes = Vec::new();
+        let some = particles.iter().zip(&self.leaves).step_by(every.max(1));
+        for (particle, &leaf) in some.filter(|(particle, _)| belongs(particle)) {
+            add(&mut weights, &mut nodes, leaf, f64::from(particle.weight));
+        }
+        while !nodes.is_empty() {
+            past.extend(self.mean(&nodes, &weights));
+            let mut parents = Vec::new();
+            for &index in &nodes {
+                let weight = weights[index as usize];
+                add(&mut weights, &mut parents, self.nodes[index as usize].parent, weight);
+            }
+            nodes = parents;
         }
         past.reverse();
         past
@@ -216,12 +220,12 @@ mod tests {
         ancestry.grow(&[at(1.0), at(5.0)], None, 1);
         ancestry.redraw(&[1, 1, 1]);
         let copies = [at(5.0), at(5.0), at(5.0)];
-        assert_eq!(ancestry.past(&copies, |_| true).iter().map(|past| past.position[0]).collect::<Vec<_>>(), [5.0]);
+        assert_eq!(ancestry.past(&copies, 1, |_| true).iter().map(|past| past.position[0]).collect::<Vec<_>>(), [5.0]);
         ancestry.grow(&[at(6.0), at(7.0), at(8.0)], None, 2);
-        let past = ancestry.past(&[at(6.0), at(7.0), at(8.0)], |_| true);
+        let past = ancestry.past(&[at(6.0), at(7.0), at(8.0)], 1, |_| true);
         assert_eq!(past.iter().map(|past| past.position[0]).collect::<Vec<_>>(), [5.0, 7.0]);
         ancestry.redraw(&[9]);
-        assert!(ancestry.past(&copies, |_| true).is_empty());
+        assert!(ancestry.past(&copies, 1, |_| true).is_empty());
     }
 
     #[test]
@@ -252,13 +256,13 @@ mod tests {
         ancestry.grow(&[at(1.0), at(11.0)], None, 2);
         let now = [at(2.0), at(2.5)];
         ancestry.grow(&now, Some(&[0, 0]), 3);
-        let past = ancestry.past(&now, |_| true);
+        let past = ancestry.past(&now, 1, |_| true);
         assert_eq!(past.iter().map(|place| place.position[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.25]);
         assert_eq!(past.iter().map(|place| place.step).collect::<Vec<_>>(), [1, 2, 3]);
         assert!((past[2].sigma_m - 0.25).abs() < 1e-9);
         // The node of each step on the way, and two at its end.
         assert_eq!(ancestry.len(), 4);
-        let one = ancestry.past(&now, |particle| particle.x > 2.2);
+        let one = ancestry.past(&now, 1, |particle| particle.x > 2.2);
         assert_eq!(one[2].position[0], 2.5);
     }
 
@@ -274,7 +278,7 @@ mod tests {
         // All have one forebear some 2 000 steps ago (Kingman's coalescent: twice their number); before that there is one
         // node for each step, after it about twice their number times its logarithm.
         assert!(ancestry.len() < 3_600 + 30 * 1_000, "{}", ancestry.len());
-        assert_eq!(ancestry.past(&particles, |_| true).len(), 3_600);
+        assert_eq!(ancestry.past(&particles, 1, |_| true).len(), 3_600);
     }
 
     proptest! {
@@ -294,7 +298,7 @@ mod tests {
             if draws.len() == 1 {
                 paths.iter_mut().zip(&particles).for_each(|(path, particle)| *path = vec![particle.x]);
             }
-            let past = ancestry.past(&particles, |_| true);
+            let past = ancestry.past(&particles, 1, |_| true);
             prop_assert_eq!(past.len(), draws.len());
             for (step, place) in past.iter().enumerate() {
                 let mean = paths.iter().map(|path| f64::from(path[step])).sum::<f64>() / 6.0;

@@ -325,10 +325,17 @@ impl ParticleFilter {
     /// Where the likeliest hypothesis has been, corrected by all that was learned since: from the first step that is
     /// remembered. While the cloud is large, nothing is added.
     pub fn past(&self) -> Vec<PastPlace> {
+        self.past_of_some(usize::MAX)
+    }
+
+    /// The same by at most so many of the particles, for pictures: it takes a time for each particle and step that all of them do
+    /// not share. Copies lie side by side, so that every so many of them are as good a sample as drawing makes.
+    pub fn past_of_some(&self, most: usize) -> Vec<PastPlace> {
+        let every = self.particles.len().div_ceil(most.max(1));
         let mut past = self.settled.clone();
         if let Some(place) = self.estimate.place() {
             let reach = NEAR_M.max(3.0 * place.sigma_m());
-            past.extend(self.ancestry.past(&self.particles, |particle| {
+            past.extend(self.ancestry.past(&self.particles, every, |particle| {
                 let at = nalgebra::Vector3::new(particle.x, particle.y, particle.z).map(f64::from);
                 (place.position - at).norm() <= reach
             }));

@@ -191,6 +191,11 @@ impl Follower {
         self.filter.past()
     }
 
+    /// The same by at most so many of the particles, for pictures of long walks.
+    pub fn past_of_some(&self, most: usize) -> Vec<PastPlace> {
+        self.filter.past_of_some(most)
+    }
+
     /// The particles as they are.
     pub fn particles(&self) -> &[Particle] {
         self.filter.particles()
