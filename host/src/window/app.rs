@@ -30,6 +30,8 @@ pub struct App {
     opening: Option<Opening>,
     /// How long the last frame took, where that is measured.
     frame: Option<Duration>,
+    /// Something was opened of which nothing has been told yet.
+    unseen: bool,
 }
 
 impl App {
@@ -52,6 +54,7 @@ impl App {
             told,
             opening: None,
             frame: None,
+            unseen: false,
         }
     }
 
@@ -70,6 +73,7 @@ impl App {
     /// Shows something of this name that somebody else makes.
     pub fn begin(&mut self, name: String, make: Make, context: &Context, beside: bool) {
         self.shoes.open(name, make, context, beside);
+        self.unseen = true;
     }
 
     /// What is shown of the selected one.
@@ -114,6 +118,10 @@ impl App {
         });
         let mut commands = Vec::new();
         let snapshot = self.shoes.snapshot().clone();
+        if self.unseen && snapshot.signals.span().is_some() {
+            self.unseen = false;
+            self.layout.show_known(|signal| snapshot.signals.knows(signal));
+        }
         let asked = Panel::top("toolbar").show(ui, |ui| toolbar::show(ui, &snapshot, &mut commands)).inner;
         Panel::bottom("bar").show(ui, |ui| {
             ui.add_space(2.0);

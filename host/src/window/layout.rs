@@ -5,7 +5,7 @@ use super::cube::Cube;
 use super::engine::Signal;
 use super::map;
 use crate::export::{ExportError, file};
-use egui_dock::{DockState, NodeIndex};
+use egui_dock::{DockState, NodeIndex, TabIndex};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -216,6 +216,32 @@ impl Layout {
         }
     }
 
+    /// Where a plot is in front that is of samples alone, and none of its signals is known, the first that knows one comes
+    /// there: who tells no samples at first never does. Others may be known later.
+    pub fn show_known(&mut self, is_known: impl Fn(Signal) -> bool) {
+        let knows = |view: &View| match view {
+            View::Plot(number) => {
+                self.plots.get(*number).is_some_and(|plot| plot.signals.iter().any(|signal| is_known(*signal)))
+            }
+            _ => false,
+        };
+        let stays_empty = |view: &View| match view {
+            View::Plot(number) => {
+                let plot = self.plots.get(*number);
+                let empty = |signal: &Signal| signal.is_of_samples() && !is_known(*signal);
+                plot.is_some_and(|plot| !plot.signals.is_empty() && plot.signals.iter().all(empty))
+            }
+            _ => false,
+        };
+        for (_, leaf) in self.dock.iter_leaves_mut() {
+            if leaf.tabs.get(leaf.active.0).is_some_and(stays_empty)
+                && let Some(known) = leaf.tabs.iter().position(&knows)
+            {
+                leaf.active = TabIndex(known);
+            }
+        }
+    }
+
     /// Whether a view is opened.
     pub fn is_open(&self, view: View) -> bool {
         self.dock.find_tab(&view).is_some()
@@ -249,6 +275,26 @@ pub fn usual_file() -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plot_of_which_nothing_is_known_gives_way_to_one_that_knows_something() {
+        let shown = |layout: &Layout| -> Vec<View> {
+            layout.dock.iter_leaves().map(|(_, leaf)| leaf.tabs[leaf.active.0]).collect()
+        };
+        let mut layout = Layout::default();
+        let before = shown(&layout);
+        assert!(before.contains(&View::Plot(0)));
+        layout.show_known(|signal| signal == Signal::AccelNorm);
+        layout.show_known(|_| false);
+        assert_eq!(shown(&layout), before);
+        // What a shoe tells that does not tell its samples.
+        layout.show_known(|signal| matches!(signal, Signal::Height | Signal::Load));
+        assert!(shown(&layout).contains(&View::Plot(3)), "{:?}", shown(&layout));
+        // A place is known later.
+        layout.open(View::Plot(6));
+        layout.show_known(|signal| matches!(signal, Signal::Height | Signal::Load));
+        assert!(shown(&layout).contains(&View::Plot(6)), "{:?}", shown(&layout));
+    }
 
     #[test]
     fn what_is_written_is_read_back() {

@@ -3,6 +3,7 @@
 use super::beside::Followed;
 use super::drawing::Drawing;
 use super::replay::{warnings, whereabouts};
+use super::sensed::Sensed;
 use super::signals::{History, Row, Signal};
 use super::snapshot::{Kind, Link, Pace, Snapshot, Warning};
 use super::walk::Anchor;
@@ -62,6 +63,7 @@ struct Told {
     track: Track,
     attitude: Option<Attitude>,
     status: Option<Status>,
+    sensed: Sensed,
     history: History,
     state: String,
     speaks: bool,
@@ -351,6 +353,7 @@ impl Told {
                 (self.track, self.history, self.anchor) = (Track::default(), History::default(), None);
                 self.state = "the shoe has started anew".into();
             }
+                self.sensed = Sensed::default();
             Event::Step { step, .. } => {
                 let step = step.unpack();
                 let arrived = connection.session().clock().to_host(step.stance_end);
@@ -365,7 +368,7 @@ impl Told {
                 let row = self.row(attitude, connection);
                 self.history.push(attitude.time.as_seconds(), &row);
             }
-            Event::Raw(_) => {}
+            Event::Raw(raw) => self.sensed.take(&raw.item),
             Event::Log(Log { text, .. }) => self.state = text.to_string(),
             Event::Reply { number, outcome } => {
                 let Some(place) = self.asked.iter().position(|(asked, _)| asked == number) else { return };
@@ -394,6 +397,7 @@ impl Told {
         let mut row = [f32::NAN; Signal::COUNT];
         let mut set = |signal: Signal, value: f32| row[signal.index()] = value;
         let velocity = Vector3::from(attitude.velocity);
+        self.sensed.write(attitude.time, &mut row);
         set(Signal::Stance, f32::from(u8::from(attitude.stance)));
         set(Signal::Speed, velocity.norm());
         set(Signal::Climb, velocity.z);

@@ -12,6 +12,7 @@ mod moment;
 mod on_graph;
 pub mod opening;
 pub mod replay;
+mod sensed;
 pub mod signals;
 pub mod snapshot;
 pub mod walk;

@@ -1,5 +1,6 @@
 //! Everything that is known at a moment of a walk.
 
+use super::sensed;
 use super::signals::{Row, Signal};
 use super::walk::Settings;
 use crate::building::Building;
@@ -135,15 +136,11 @@ impl Moment {
 
     pub(super) fn row(&self, time: Micros) -> Row {
         let mut row = [f32::NAN; Signal::COUNT];
-        let mut set = |signal: Signal, value: f32| row[signal.index()] = value;
         if let Some(sample) = &self.sample {
-            let (accel, gyro) = (sample.accel.0, sample.gyro.0);
-            let axes = [Signal::AccelX, Signal::AccelY, Signal::AccelZ];
-            axes.into_iter().zip(accel.iter()).for_each(|(signal, value)| set(signal, *value));
-            let axes = [Signal::GyroX, Signal::GyroY, Signal::GyroZ];
-            axes.into_iter().zip(gyro.iter()).for_each(|(signal, value)| set(signal, *value));
-            set(Signal::AccelNorm, accel.norm());
-            set(Signal::GyroNorm, gyro.norm());
+            sensed::write(sample, &mut row);
+        }
+        let mut set = |signal: Signal, value: f32| row[signal.index()] = value;
+        if self.sample.is_some() {
             let insight = self.tracker.insight();
             set(Signal::Statistic, insight.statistic);
             set(Signal::Bound, insight.bound);

@@ -141,6 +141,11 @@ impl Signal {
         }
     }
 
+    /// Whether it is known with each sample, and never without them.
+    pub fn is_of_samples(self) -> bool {
+        self.index() <= Self::Bound.index() || matches!(self, Self::WaySigma | Self::VelocitySigma | Self::Innovation)
+    }
+
     /// Where it stands in a [`Row`].
     pub fn index(self) -> usize {
         self as usize
