@@ -8,6 +8,7 @@
 pub mod camera;
 mod controls;
 mod gauges;
+mod glide;
 pub mod keys;
 mod lettering;
 mod marks;

@@ -1,6 +1,7 @@
 //! The map as a part of a window.
 
 use super::camera::{Camera, Projection, Sight};
+use super::glide::Glide;
 use super::overlay::{Overlay, Person};
 use super::painter::{Look, Opacity, Painter};
 use super::palette::Palette;
@@ -20,9 +21,6 @@ const FLAT_WALL_M: f32 = 0.05;
 /// Of a floor above the one that is looked at.
 const HINTED: Opacity = Opacity { ground: 0.05, walls: 0.09, marks: 0.3 };
 const WHOLE: Opacity = Opacity { ground: 1.0, walls: 1.0, marks: 1.0 };
-/// How fast the camera comes to where it is sent: the share of the way left after this time is 1/e. **Units:** s.
-const GLIDE_S: f64 = 0.09;
-
 /// Before it is known where somebody is, the floor of a place that is likelier than this is looked at.
 const LIKELY: f64 = 0.8;
 
@@ -43,8 +41,8 @@ pub struct Response {
 #[derive(Debug)]
 pub struct Map {
     painter: Painter,
-    /// Where the camera is going.
-    goal: Option<Camera>,
+    /// How the camera moves, while it does.
+    glide: Option<Glide>,
     /// Bounds of what was shown last.
     shown: Option<[Point; 2]>,
     /// What is measured.
@@ -94,11 +92,11 @@ impl Map {
     }
 
     fn with(render: &RenderState, care: Care) -> Self {
-        Self { painter: Painter::new(render, care), goal: None, shown: None, ruler: Ruler::default(), picked: None }
+        Self { painter: Painter::new(render, care), glide: None, shown: None, ruler: Ruler::default(), picked: None }
     }
 
     /// Shows all of the building, or all of the walk where there is none.
-    pub fn fit(&mut self, view: &View, scene: &Scene, overlay: &Overlay, rect: Rect) -> Camera {
+    pub fn fit(&self, view: &View, scene: &Scene, overlay: &Overlay, rect: Rect) -> Camera {
         let spread = spread(view);
         let level = level(view, scene, overlay);
         let mut points: Vec<[f64; 3]> = Vec::new();
@@ -142,7 +140,7 @@ impl Map {
         // Where somebody looked in one building says nothing of another.
         let bounds = scene.bounds();
         if self.shown.replace(bounds).is_some_and(|before| before != bounds) {
-            (view.camera, self.goal) = (None, None);
+            (view.camera, self.glide) = (None, None);
         }
         let camera = match view.camera {
             Some(camera) => camera.bounded(),
@@ -151,7 +149,7 @@ impl Map {
         view.camera = Some(camera);
         keys::act(ui, &response, view, scene, &mut self.ruler);
         if keys::wants_fit(ui, &response) || response.double_clicked() {
-            self.goal = Some(self.fit(view, scene, overlay, rect));
+            self.send(view, self.fit(view, scene, overlay, rect));
             view.follow = false;
         }
         self.steer(ui, &response, view, rect);
@@ -188,7 +186,7 @@ impl Map {
         }
         gauges::draw(&painter, &scenery, told.hovered.as_ref());
         if controls::show(ui, rect, view, scene, level, &mut self.ruler) {
-            self.goal = Some(self.fit(view, scene, overlay, rect));
+            self.send(view, self.fit(view, scene, overlay, rect));
         }
         told
     }
@@ -199,7 +197,7 @@ impl Map {
         let sight = Sight::new(camera, view.projection, rect);
         if let Some(steered) = pointer::steer(ui, response, &sight, view.follow) {
             view.camera = Some(steered.bounded());
-            self.goal = None;
+            self.glide = None;
             // Whoever moves the map away from the person does not want it back at the next step.
             view.follow &= steered.target == camera.target;
         }
@@ -213,22 +211,26 @@ impl Map {
         }
         let camera = view.camera.unwrap_or_default();
         let target = scene.shown(person.position, spread(view));
-        let goal = Camera { target, ..self.goal.unwrap_or(camera) }.bounded();
-        if !goal.is_at(&camera) {
-            self.goal = Some(goal);
+        let goal = self.glide.as_ref().map_or(camera, Glide::goal);
+        let wanted = Camera { target, ..goal }.bounded();
+        if !wanted.is_at(&goal) {
+            self.send(view, wanted);
         }
+    }
+
+    /// Sends the camera somewhere, from where it is.
+    fn send(&mut self, view: &View, to: Camera) {
+        self.glide = Some(Glide::new(view.camera.unwrap_or_default(), to));
     }
 
     /// Brings the camera nearer to where it is going.
     fn glide(&mut self, ui: &Ui, view: &mut View) {
-        let (Some(goal), Some(camera)) = (self.goal, view.camera) else { return };
+        let Some(glide) = &mut self.glide else { return };
         let passed = f64::from(ui.input(|input| input.stable_dt)).min(0.1);
-        let next = camera.towards(&goal, 1.0 - (-passed / GLIDE_S).exp());
-        if next.is_at(&goal) {
-            view.camera = Some(goal);
-            self.goal = None;
+        view.camera = Some(glide.go(passed));
+        if glide.is_over() {
+            self.glide = None;
         } else {
-            view.camera = Some(next);
             ui.ctx().request_repaint();
         }
     }
