@@ -38,7 +38,7 @@ pub struct Kind<'a> {
     pub attributes: &'a [wgpu::VertexAttribute],
     /// Bytes from one to the next; none when nothing is read.
     pub stride: u64,
-    /// Whether the attributes are those of an instance, four corners of which are drawn as a strip.
+    /// Whether the attributes are those of an instance, the corners of which are drawn as a strip.
     pub instanced: bool,
     /// What happens to the depth.
     pub depth: Depth,

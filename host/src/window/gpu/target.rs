@@ -21,7 +21,7 @@ impl Care {
     /// For a picture that one has time for.
     pub const BEST: Self = Self { samples: 4, particles: usize::MAX };
     /// Where there is no graphics card: edges have steps, and a crowd of particles looks the same with fewer of them.
-    const SOFTWARE: Self = Self { samples: 1, particles: 10_000 };
+    const SOFTWARE: Self = Self { samples: 1, particles: 4_000 };
 
     /// So that a window moves with ease.
     pub fn quick(render: &RenderState) -> Self {

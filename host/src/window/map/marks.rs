@@ -53,7 +53,7 @@ impl Cloud {
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, floor: usize) {
         if let Some(range) = self.floors.get(floor).filter(|range| !range.is_empty()) {
             pass.set_vertex_buffer(0, self.buffer.slice(..));
-            pass.draw(0..4, range.clone());
+            pass.draw(0..3, range.clone());
         }
     }
 }
@@ -147,7 +147,7 @@ impl Strokes {
 }
 
 /// Width of a way. **Units:** points.
-fn width(role: Role) -> f32 {
+pub(super) fn width(role: Role) -> f32 {
     match role {
         Role::Truth => 4.0,
         Role::Free | Role::Other => 2.0,
