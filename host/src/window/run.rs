@@ -2,6 +2,7 @@
 
 use super::App;
 use super::engine::{Make, Opening};
+use super::gpu::DITHERING;
 use super::map::Map;
 use eframe::egui::{ViewportBuilder, ViewportCommand};
 use std::path::PathBuf;
@@ -45,7 +46,7 @@ pub fn window(first: Vec<First>, layout: Option<PathBuf>, duration: Option<Durat
         return Err(Error::NoDisplay);
     }
     let viewport = ViewportBuilder::default().with_title("Sohle").with_app_id("sohle").with_inner_size([1280.0, 800.0]);
-    let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
+    let options = eframe::NativeOptions { viewport, dithering: DITHERING, ..eframe::NativeOptions::default() };
     let begun = Instant::now();
     let made = eframe::run_native(
         "sohle",

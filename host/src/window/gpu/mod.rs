@@ -12,3 +12,6 @@ pub use target::{Care, Target};
 
 /// What the window draws with: device, queue, and the painter of the controls.
 pub use eframe::egui_wgpu::RenderState;
+
+/// Nothing in the window shades from one colour into another, so nothing is gained by noise in each pixel.
+pub const DITHERING: bool = false;

@@ -1,7 +1,7 @@
 //! Drawing without a window: for measuring, for pictures in files, and for tests.
 
-use super::RenderState;
 use super::target::FORMAT;
+use super::{DITHERING, RenderState};
 use eframe::egui::{self, Context, FullOutput, RawInput, Rect, Theme, Ui, vec2};
 use eframe::egui_wgpu::{RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use eframe::wgpu;
@@ -69,7 +69,8 @@ impl Studio {
         let setup = WgpuSetup::CreateNew(WgpuSetupCreateNew::without_display_handle());
         let instance = pollster::block_on(setup.new_instance());
         let configuration = WgpuConfiguration { wgpu_setup: setup, ..WgpuConfiguration::default() };
-        let render = RenderState::create(&configuration, &instance, None, RendererOptions::default());
+        let options = RendererOptions { dithering: DITHERING, ..RendererOptions::default() };
+        let render = RenderState::create(&configuration, &instance, None, options);
         let render = pollster::block_on(render).map_err(|error| Error::NoAdapter(error.to_string()))?;
         Ok(Self { render, context: Context::default(), seconds: 0.0 })
     }
