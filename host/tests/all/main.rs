@@ -10,3 +10,4 @@ mod live;
 mod map;
 mod phone;
 mod place;
+mod window;
