@@ -89,6 +89,9 @@ impl Shoes {
                 shoe.snapshot = snapshot;
             }
             shoe.latencies.frame(before);
+            if let Some(picture) = before {
+                shoe.engine.drawn_in(picture);
+            }
         }
         self.open.iter().any(|shoe| shoe.snapshot.ended)
     }
@@ -160,7 +163,8 @@ impl Shoes {
         {
             return (scene, overlay.clone());
         }
-        let mut all = Overlay { clusters: selected.overlay.clusters.clone(), ..Overlay::default() };
+        let Overlay { clusters, feet, .. } = &selected.overlay;
+        let mut all = Overlay { clusters: clusters.clone(), feet: feet.clone(), ..Overlay::default() };
         for (index, shoe) in self.neighbours() {
             let (chosen, colour) = (index == self.selected, Some(shoe.colour));
             let Overlay { clouds, tracks, people, .. } = &shoe.snapshot.overlay;

@@ -12,7 +12,7 @@ use sohle::building::{Building, geojson};
 use sohle::particle::{Cluster, Particle};
 use sohle::window::cube::Cube;
 use sohle::window::gpu::offscreen::{Picture, Sheet, Studio};
-use sohle::window::map::{Cloud, Map, Overlay, Person, Projection, Response, Rgb, Role, Scene, Track, View};
+use sohle::window::map::{Cloud, Foot, Map, Overlay, Person, Projection, Response, Rgb, Role, Scene, Track, View};
 use std::sync::Arc;
 
 /// Colours as the map has them on light ground.
@@ -69,6 +69,7 @@ fn overlay() -> Overlay {
             selected: true,
         }],
         clusters: vec![cluster(0.6, 30.0, 7.6), cluster(0.4, 12.0, 4.0)].into(),
+        feet: Vec::new(),
     }
 }
 
@@ -123,6 +124,23 @@ fn particles_and_paths_are_drawn_and_can_be_left_out() {
         // What is left of red is the needle to the north.
         let [green, red, violet] = [GREEN, RED, VIOLET].map(|rgb| count(&bare, rgb));
         assert!(green < 10 && red < 80 && violet > 200, "{projection:?}: {green} {red} {violet}");
+    }
+}
+
+/// It belongs to the way without the map, and is left out with it.
+#[test]
+fn a_foot_on_its_way_is_drawn_from_where_it_stood() {
+    let Some(mut studio) = studio() else { return };
+    for projection in [Projection::Orbit, Projection::Flat] {
+        let mut view = View { projection, ..View::default() };
+        let mut overlay =
+            Overlay { feet: vec![Foot { from: [4.0, 7.7, 0.0], to: [24.0, 7.7, 0.0] }], ..Overlay::default() };
+        let foot = count(&picture(&mut studio, SHEET, &view, &overlay), VIOLET);
+        view.layers.free = false;
+        let hidden = count(&picture(&mut studio, SHEET, &view, &overlay), VIOLET);
+        overlay.feet.clear();
+        let without = count(&picture(&mut studio, SHEET, &view, &overlay), VIOLET);
+        assert!(foot > without + 150 && hidden == without, "{projection:?}: {foot} {hidden} {without}");
     }
 }
 

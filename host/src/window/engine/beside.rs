@@ -85,6 +85,19 @@ pub struct Followed<'a> {
     pub fusion: Option<&'a Fusion>,
 }
 
+impl Followed<'_> {
+    /// A place of the track as it lies in the building; where nobody is followed there, as it is. **Units:** m.
+    pub fn laid(&self, point: [f64; 3]) -> [f64; 3] {
+        self.anchor.map_or(point, |anchor| anchor.apply(point))
+    }
+
+    /// Where the foot stood by the steps alone. In a building they are nowhere until it is known where they began.
+    pub fn stances(&self) -> impl DoubleEndedIterator<Item = [f64; 3]> {
+        let known = self.follower.is_none() || self.anchor.is_some();
+        self.steps.stances.iter().filter(move |_| known).map(|stance| self.laid(stance.position))
+    }
+}
+
 impl Others {
     /// Begins with one, or ends it. `measured`: lengths of steps are measured, not guessed.
     ///

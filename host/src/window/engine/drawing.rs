@@ -1,17 +1,22 @@
 //! What is drawn of somebody who is followed.
 
 use super::beside::{Beside, Followed, Others};
-use super::walk::Moment;
+use super::walk::{Anchor, Moment};
 use crate::building::Building;
 use crate::follow::{Follower, runs};
 use crate::graph;
 use crate::particle::{Particle, State};
 use crate::recording::Recording;
-use crate::window::map::{Cloud, Overlay, Person, Role, Track};
+use crate::window::map::{Cloud, Foot, Overlay, Person, Role, Track};
 use std::sync::Arc;
 
 /// Of the true way, every so many poses are enough.
 const THINNING: usize = 10;
+/// The corrected past is drawn as the mean of so many particles: a thirtieth of their scatter is less than a line is wide.
+const PAST_BY: usize = 300;
+
+/// Steps, stances, how they lie in the building, and which walk it is: while they are the same, so is the drawing but for the foot.
+type Stepped = (usize, usize, Option<Anchor>, usize);
 
 /// Draws moments of one walk; what has not changed is not made anew.
 #[derive(Debug, Default)]
@@ -19,8 +24,8 @@ pub struct Drawing {
     truth: Option<Track>,
     /// Who else follows.
     others: Others,
-    /// What was drawn after so many steps, and for which start.
-    stepped: Option<(usize, usize, Overlay)>,
+    /// What was drawn after the last step, and what it was drawn of.
+    stepped: Option<(Stepped, Overlay)>,
 }
 
 impl Drawing {
@@ -67,17 +72,21 @@ impl Drawing {
 
     /// Draws somebody by steps, with the foot where it is since the last one.
     pub fn draw(&mut self, followed: &Followed<'_>, foot: [f64; 3], epoch: usize) -> Overlay {
-        let count = followed.steps.steps.len();
+        let state = (followed.steps.steps.len(), followed.steps.stances.len(), followed.anchor.copied(), epoch);
         let overlay = match &self.stepped {
-            Some((at, known, overlay)) if *at == count && *known == epoch => overlay.clone(),
+            Some((known, overlay)) if *known == state => overlay.clone(),
             _ => {
                 let mut overlay = self.after_step(followed.follower);
                 overlay.tracks.extend(self.others.tracks(followed, epoch));
-                self.stepped = Some((count, epoch, overlay.clone()));
+                let way: Vec<_> = followed.stances().collect();
+                if !way.is_empty() {
+                    overlay.tracks.push(track("steps alone", Role::Free, vec![way]));
+                }
+                self.stepped = Some((state, overlay.clone()));
                 overlay
             }
         };
-        self.with_foot(overlay, followed, foot)
+        with_foot(overlay, followed, foot)
     }
 
     fn after_step(&self, follower: Option<&Follower>) -> Overlay {
@@ -88,7 +97,7 @@ impl Drawing {
             let place = followed.place.as_ref().filter(|_| followed.state == State::Located)?;
             Some(place.position.into())
         }));
-        let past = follower.past().into_iter().map(|place| place.position).collect();
+        let past = follower.past_of_some(PAST_BY).into_iter().map(|place| place.position).collect();
         let person = estimate.place().filter(|_| located).map(|place| Person {
             name: "shoe".into(),
             position: place.position.into(),
@@ -105,35 +114,77 @@ impl Drawing {
             tracks: self.truth.iter().cloned().chain(tracks).collect(),
             people: person.into_iter().collect(),
             clusters: estimate.clusters.clone().into(),
+            feet: Vec::new(),
         }
     }
+}
 
-    fn with_foot(&self, mut overlay: Overlay, followed: &Followed<'_>, foot: [f64; 3]) -> Overlay {
-        let Followed { steps, anchor, .. } = *followed;
-        let followed = followed.follower.is_some();
-        // In a building, the steps alone are nowhere until it is known where they began.
-        if followed && anchor.is_none() {
-            return overlay;
-        }
-        let laid = |point: [f64; 3]| anchor.map_or(point, |anchor| anchor.apply(point));
-        let stances = steps.stances.iter().map(|stance| laid(stance.position));
-        let way: Vec<_> = stances.chain([laid(foot)]).collect();
-        if !followed && !steps.stances.is_empty() {
-            overlay.people.push(Person {
-                name: "shoe".into(),
-                position: laid(foot),
-                floor: 0,
-                heading: steps.stances.last().map(|stance| stance.heading),
-                sigma_m: 0.0,
-                colour: None,
-                selected: true,
-            });
-        }
-        overlay.tracks.push(track("steps alone", Role::Free, vec![way]));
-        overlay
+/// The foot alone changes with each sample: all else is drawn as it was after the last step.
+fn with_foot(mut overlay: Overlay, followed: &Followed<'_>, foot: [f64; 3]) -> Overlay {
+    let (Some(from), Some(last)) = (followed.stances().next_back(), followed.steps.stances.last()) else {
+        return overlay;
+    };
+    let to = followed.laid(foot);
+    overlay.feet.push(Foot { from, to });
+    if followed.follower.is_none() {
+        overlay.people.push(Person {
+            name: "shoe".into(),
+            position: to,
+            floor: 0,
+            heading: Some(last.heading),
+            sigma_m: 0.0,
+            colour: None,
+            selected: true,
+        });
     }
+    overlay
 }
 
 fn track(name: &str, role: Role, pieces: Vec<Vec<[f64; 3]>>) -> Track {
     Track { name: name.into(), role, colour: None, pieces: pieces.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::Track as Steps;
+    use nalgebra::{Matrix4, Vector3};
+    use sohle_shared::sample::ClippedSamples;
+    use sohle_shared::step::{FloorMode, Step, StepQuality};
+    use sohle_shared::time::Micros;
+
+    fn step(index: u32) -> Step {
+        Step {
+            index,
+            stance_start: Micros(i64::from(index) * 1_000_000),
+            stance_end: Micros(i64::from(index) * 1_000_000 + 400_000),
+            displacement: Vector3::new(1.2, 0.0, 0.0),
+            turn: 0.0,
+            covariance: Matrix4::identity() * 1e-4,
+            mode: FloorMode::Level,
+            quality: StepQuality::default(),
+            clipped: ClippedSamples::default(),
+        }
+    }
+
+    /// The map is drawn anew for another way, which takes its time where there is no graphics card.
+    #[test]
+    fn between_two_steps_nothing_is_another_way_but_the_foot_is_elsewhere() {
+        let mut drawing = Drawing::default();
+        let mut draw = |count: u32, foot: f64| {
+            let steps: Vec<Step> = (0..count).map(step).collect();
+            let track = Steps::of_steps(&steps);
+            let followed = Followed { steps: &track, follower: None, anchor: None, fusion: None };
+            drawing.draw(&followed, [foot, 0.0, 0.1], 0)
+        };
+        let same = |a: &Overlay, b: &Overlay| {
+            assert_eq!(a.tracks.len(), 1);
+            a.tracks.iter().zip(&b.tracks).all(|(a, b)| Arc::ptr_eq(&a.pieces, &b.pieces))
+        };
+        let (first, second, third) = (draw(3, 3.7), draw(3, 4.2), draw(4, 4.9));
+        assert!(same(&first, &second) && !same(&second, &third));
+        assert_eq!((first.feet[0].to[0], second.feet[0].to[0]), (3.7, 4.2));
+        assert_eq!(second.feet[0].from, *second.tracks[0].pieces[0].last().unwrap());
+        assert_eq!(second.people[0].position, second.feet[0].to);
+    }
 }

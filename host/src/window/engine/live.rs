@@ -222,6 +222,7 @@ impl Source for Live {
 
     fn work(&mut self, until: Instant) -> Work {
         self.heard.fresh = false;
+        let before = self.heard.stepped;
         loop {
             let left = until.saturating_duration_since(Instant::now());
             let Self { heard, listening, .. } = self;
@@ -234,7 +235,7 @@ impl Source for Live {
             if let Some(answer) = self.heard.answer.take() {
                 self.fault = Some(answer);
             }
-            if left.is_zero() {
+            if left.is_zero() || self.heard.stepped != before {
                 break;
             }
         }
@@ -248,7 +249,8 @@ impl Source for Live {
             self.heard.fresh |= self.ended;
         }
         // The work itself waits for what comes.
-        Work { changed: self.heard.fresh, pause: Some(Duration::ZERO) }
+        let stepped = self.heard.stepped != before;
+        Work { changed: self.heard.fresh, stepped, pause: Some(Duration::ZERO) }
     }
 
     fn snapshot(&mut self) -> Snapshot {
@@ -351,9 +353,9 @@ impl Told {
             Event::Rebooted { .. } => {
                 // Its clock and its steps begin anew.
                 (self.track, self.history, self.anchor) = (Track::default(), History::default(), None);
+                self.sensed = Sensed::default();
                 self.state = "the shoe has started anew".into();
             }
-                self.sensed = Sensed::default();
             Event::Step { step, .. } => {
                 let step = step.unpack();
                 let arrived = connection.session().clock().to_host(step.stance_end);
@@ -395,9 +397,9 @@ impl Told {
 
     fn row(&self, attitude: &Attitude, connection: &Connection) -> Row {
         let mut row = [f32::NAN; Signal::COUNT];
+        self.sensed.write(attitude.time, &mut row);
         let mut set = |signal: Signal, value: f32| row[signal.index()] = value;
         let velocity = Vector3::from(attitude.velocity);
-        self.sensed.write(attitude.time, &mut row);
         set(Signal::Stance, f32::from(u8::from(attitude.stance)));
         set(Signal::Speed, velocity.norm());
         set(Signal::Climb, velocity.z);

@@ -25,6 +25,7 @@ pub use snapshot::{Kind, Pace, Snapshot};
 use crate::particle;
 use sohle_shared::tracker;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -68,6 +69,8 @@ pub enum Command {
 pub struct Work {
     /// Something is to be shown.
     pub changed: bool,
+    /// It is a step, which is shown at once.
+    pub stepped: bool,
     /// How long there is nothing to do; nothing until a command comes.
     pub pause: Option<Duration>,
 }
@@ -89,8 +92,12 @@ pub trait Source {
 
 /// Work in one go, before commands are looked at.
 const TURN: Duration = Duration::from_millis(10);
-/// Between two snapshots.
+/// Between two snapshots at least, but for steps; and so many times what a picture takes, so that who draws slowly leaves time
+/// for computing.
 const FRAME: Duration = Duration::from_millis(16);
+const FRAMES: u32 = 2;
+/// A single picture that took for ever does not keep others back.
+const SLOWEST: Duration = Duration::from_millis(500);
 /// Between two looks for commands when there is nothing to do.
 const IDLE: Duration = Duration::from_secs(3600);
 
@@ -99,12 +106,16 @@ pub struct Engine {
     commands: Sender<Command>,
     thread: JoinHandle<()>,
     latest: Arc<Mutex<Option<Arc<Snapshot>>>>,
+    /// What a picture takes. **Units:** us.
+    picture_us: Arc<AtomicU32>,
 }
 
 impl Engine {
     /// Makes something of this name in a thread of its own. `wake` is called when there is something to show.
     pub fn start(name: String, make: Make, wake: impl Fn() + Send + 'static) -> Self {
         let (commands, asked) = mpsc::channel();
+        let picture_us = Arc::new(AtomicU32::new(0));
+        let drawn_in = picture_us.clone();
         let latest = Arc::new(Mutex::new(None));
         let post = latest.clone();
         let publish = move |snapshot: Snapshot| {
@@ -114,16 +125,21 @@ impl Engine {
         let thread = std::thread::spawn(move || {
             publish(Snapshot { name: name.clone(), kind: Kind::Opening, ..Snapshot::default() });
             match make() {
-                Ok(mut source) => run(source.as_mut(), &asked, publish),
+                Ok(mut source) => run(source.as_mut(), &asked, &drawn_in, publish),
                 Err(error) => publish(Snapshot { name, fault: Some(error.to_string()), ..Snapshot::default() }),
             }
         });
-        Self { commands, thread, latest }
+        Self { commands, thread, latest, picture_us }
     }
 
     /// Asks for something. Nobody hears it when nothing could be opened.
     pub fn ask(&self, command: Command) {
         let _ = self.commands.send(command);
+    }
+
+    /// A picture took so long.
+    pub fn drawn_in(&self, picture: Duration) {
+        self.picture_us.store(u32::try_from(picture.as_micros()).unwrap_or(u32::MAX), Ordering::Relaxed);
     }
 
     /// Ends it. A recording is whole when the thread has ended.
@@ -137,12 +153,14 @@ impl Engine {
     }
 }
 
-fn run(source: &mut dyn Source, asked: &Receiver<Command>, publish: impl Fn(Snapshot)) {
+fn run(source: &mut dyn Source, asked: &Receiver<Command>, picture_us: &AtomicU32, publish: impl Fn(Snapshot)) {
     publish(source.snapshot());
-    let mut published = Instant::now();
+    let (mut published, mut stepped) = (Instant::now(), None::<Instant>);
     let (mut dirty, mut pause) = (false, Some(Duration::ZERO));
     loop {
-        let due = dirty.then(|| FRAME.saturating_sub(published.elapsed()));
+        let picture = Duration::from_micros(picture_us.load(Ordering::Relaxed).into());
+        let frame = (FRAMES * picture).clamp(FRAME, SLOWEST);
+        let due = dirty.then(|| frame.saturating_sub(published.elapsed()));
         let wait = pause.unwrap_or(IDLE).min(due.unwrap_or(IDLE));
         match asked.recv_timeout(wait) {
             Ok(command) => {
@@ -156,10 +174,63 @@ fn run(source: &mut dyn Source, asked: &Receiver<Command>, publish: impl Fn(Snap
         let work = source.work(Instant::now() + TURN);
         dirty |= work.changed;
         pause = work.pause;
-        if dirty && published.elapsed() >= FRAME {
+        // Of steps that come all at once, not each has a picture.
+        let step = work.stepped && stepped.is_none_or(|before| before.elapsed() >= FRAME);
+        if dirty && (step || published.elapsed() >= frame) {
             publish(source.snapshot());
             published = Instant::now();
+            stepped = if step { Some(published) } else { stepped };
             dirty = false;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    /// Always something new, and a step when that is said.
+    struct Restless {
+        stepped: bool,
+    }
+
+    impl Source for Restless {
+        fn obey(&mut self, _: Command) {}
+
+        fn work(&mut self, _: Instant) -> Work {
+            Work { changed: true, stepped: std::mem::take(&mut self.stepped), pause: Some(Duration::from_millis(1)) }
+        }
+
+        fn snapshot(&mut self) -> Snapshot {
+            Snapshot::default()
+        }
+    }
+
+    /// Snapshots in about a tenth of a second, where a picture takes so long; and how long it was.
+    fn published(picture: Duration, stepped: bool) -> (usize, Duration) {
+        let (commands, asked) = mpsc::channel();
+        let count = Cell::new(0);
+        let begun = Instant::now();
+        let ends = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(100));
+            drop(commands);
+        });
+        let picture_us = AtomicU32::new(picture.as_micros() as u32);
+        run(&mut Restless { stepped }, &asked, &picture_us, |_| count.set(count.get() + 1));
+        ends.join().unwrap();
+        (count.get(), begun.elapsed())
+    }
+
+    #[test]
+    fn who_draws_slowly_gets_fewer_snapshots_but_each_step_at_once() {
+        for (picture, stepped) in [(0, false), (100, false), (100, true), (9_000, true)] {
+            let picture = Duration::from_millis(picture);
+            let interval = (FRAMES * picture).clamp(FRAME, SLOWEST);
+            let (count, time) = published(picture, stepped);
+            let least = 1 + usize::from(stepped);
+            let most = least + (time.as_secs_f64() / interval.as_secs_f64()) as usize;
+            assert!((least..=most).contains(&count), "{picture:?} {stepped}: {count} in {time:?}");
         }
     }
 }

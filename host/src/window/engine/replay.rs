@@ -175,7 +175,8 @@ impl Source for Replay {
             Goal::Here => {}
         }
         let after = (self.walk.now().index, self.walk.now().track.steps.len());
-        if after.1 > before.1 {
+        let stepped = after.1 > before.1;
+        if stepped {
             // It came since then, and was followed.
             self.stepped = Some(begun);
         }
@@ -184,7 +185,7 @@ impl Source for Replay {
             Goal::Here if self.pace.speed.is_finite() => Some(TICK),
             _ => Some(Duration::ZERO),
         };
-        Work { changed: after != before, pause }
+        Work { changed: after != before, stepped, pause }
     }
 
     fn snapshot(&mut self) -> Snapshot {

@@ -27,7 +27,7 @@ mod widget;
 pub use camera::{Camera, Projection};
 pub use keys::KEYS;
 pub(super) use mesh::hull;
-pub use overlay::{Cloud, Overlay, Person, Role, Track};
+pub use overlay::{Cloud, Foot, Overlay, Person, Role, Track};
 pub use palette::Rgb;
 pub use scene::{Place, Scene};
 pub use view::{Layers, View};

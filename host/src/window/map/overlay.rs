@@ -14,6 +14,8 @@ pub struct Overlay {
     pub tracks: Vec<Track>,
     /// Where the persons are.
     pub people: Vec<Person>,
+    /// Feet on their way from the last stance; they are another place with each sample.
+    pub feet: Vec<Foot>,
     /// The places that are possible for the selected person, the likeliest first.
     pub clusters: Arc<[Cluster]>,
 }
@@ -56,6 +58,15 @@ pub struct Track {
     pub colour: Option<Rgb>,
     /// Points in order; between two pieces nothing is drawn. **Units:** m; **Frame:** building.
     pub pieces: Pieces,
+}
+
+/// A foot on its way, which goes on where the way by the steps alone ends. **Units:** m; **Frame:** building.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    /// Where it stood last.
+    pub from: [f64; 3],
+    /// Where it is.
+    pub to: [f64; 3],
 }
 
 /// Where a person is.

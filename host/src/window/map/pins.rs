@@ -1,7 +1,8 @@
 //! Persons and the places where they may be.
 
 use super::lettering::Letters;
-use super::overlay::{Person, Role};
+use super::marks::width;
+use super::overlay::{Foot, Person, Role};
 use super::palette::{Rgb, colour};
 use super::widget::Scenery;
 use crate::particle::Cluster;
@@ -51,6 +52,9 @@ pub fn draw(painter: &Painter, letters: &mut Letters<'_>, scenery: &Scenery<'_>,
                 pinned.clusters.extend(rects.into_iter().map(|rect| (index, rect)));
             }
         }
+    }
+    if scenery.view.layers.shows(Role::Free) {
+        overlay.feet.iter().for_each(|foot| leg(painter, scenery, foot));
     }
     let named = overlay.people.len() > 1;
     for (index, someone) in overlay.people.iter().enumerate() {
@@ -107,6 +111,18 @@ fn place(
     let badge = letters.badge(&text, at - vec2(0.0, 12.0), Align2::CENTER_BOTTOM, rgb);
     painter.circle_filled(at, 3.0, colour(rgb));
     vec![badge, Rect::from_center_size(at, vec2(20.0, 20.0))]
+}
+
+/// The way goes on to where the foot is. It moves with each sample, for which the map is not drawn anew.
+fn leg(painter: &Painter, scenery: &Scenery<'_>, foot: &Foot) {
+    let storey = scenery.scene.storey_at(foot.from[2].min(foot.to[2]));
+    let (true, Some(from), Some(to)) = (scenery.is_drawn(storey), scenery.at(foot.from), scenery.at(foot.to)) else {
+        return;
+    };
+    let width = width(Role::Free);
+    for (width, rgb) in [(width + 2.2, scenery.palette.casing), (width, scenery.palette.role(Role::Free))] {
+        painter.line_segment([from, to], Stroke::new(width, colour(rgb)));
+    }
 }
 
 fn person(
