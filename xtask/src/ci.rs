@@ -1,8 +1,8 @@
 //! Every check that a change must pass, in stages.
 
 use crate::process::{self, Failure};
-use crate::stage::{Run, Tally};
-use crate::{bench, check, determinism, device, emulate, emulator, firmware, fuzz, tools, window};
+use crate::stage::{Beside, Run, Tally};
+use crate::{bench, check, determinism, emulate, emulator, fuzz, tools, window};
 use std::process::Command;
 
 /// The shoe's Bluetooth, which no workspace has: it is built for the host here, and with the firmware for the boards.
@@ -24,6 +24,7 @@ pub fn run(arguments: &Arguments) -> bool {
     }
     run.check("format", format);
     run.check("committed files", check::run);
+    let boards = Beside::start(boards());
     run.check("lint", || {
         process::run(&mut cargo("clippy --locked --workspace --all-features --all-targets -- -D warnings"))
     });
@@ -33,22 +34,21 @@ pub fn run(arguments: &Arguments) -> bool {
                 .env("RUSTDOCFLAGS", "-D warnings"),
         )
     });
-    run.stage("tests", tests);
-    run.stage("documentation tests", || counted(cargo("test --locked --workspace --all-features --doc")));
     run.check("Bluetooth lint", || {
         process::run(&mut cargo(&format!("clippy --locked {BLUETOOTH} --all-targets -- -D warnings")))
     });
-    run.stage("Bluetooth tests", || counted(cargo(&format!("test --locked {BLUETOOTH}"))));
     run.check("fuzz lint", || {
         // With the folder of the others, most of it is built already.
         process::run(&mut cargo(
             "clippy --locked --manifest-path fuzz/Cargo.toml --target-dir target --all-targets -- -D warnings",
         ))
     });
+    // Nothing builds while tests run.
+    run.join(boards);
+    run.stage("tests", tests);
+    run.stage("documentation tests", || counted(cargo("test --locked --workspace --all-features --doc")));
+    run.stage("Bluetooth tests", || counted(cargo(&format!("test --locked {BLUETOOTH}"))));
     run.check("fuzzing", fuzz::check);
-    run.check("no_std build", device::build_shared);
-    run.check("firmware lint", firmware::lint);
-    run.check("firmware", || firmware::run(&firmware::Arguments::default()));
     run.check("bits on a Cortex-M4F", emulator::run);
     run.check("the emulated shoe", emulate::check);
     run.check("the same on Bluetooth", emulate::radio::check);
@@ -56,6 +56,15 @@ pub fn run(arguments: &Arguments) -> bool {
     run.check("cost", bench::run);
     run.check("determinism", determinism::run);
     run.summary()
+}
+
+/// What is built for the boards by this program's own commands. They have a target folder of their own and one thing to do
+/// at a time for the most part: core, then the linking of one program after the other.
+fn boards() -> Vec<(&'static str, Command)> {
+    let stages =
+        [("no_std build", &["device"][..]), ("firmware lint", &["firmware", "--lint"]), ("firmware", &["firmware"])];
+    let itself = std::env::current_exe().unwrap_or_else(|_| "xtask".into());
+    stages.map(|(name, words)| (name, process::program(&itself.to_string_lossy(), words))).into()
 }
 
 /// A cargo command from its words.

@@ -69,11 +69,14 @@ enum Boards {
 }
 
 /// What to build.
-#[derive(Default, clap::Args)]
+#[derive(clap::Args)]
 pub struct Arguments {
     /// The board.
     #[arg(long, value_enum, default_value_t)]
     board: Boards,
+    /// Instead, lints the programs of all boards and of the emulator.
+    #[arg(long, conflicts_with = "board")]
+    lint: bool,
 }
 
 /// What to put where.
@@ -139,8 +142,11 @@ impl Size {
     }
 }
 
-/// Builds all programs for the boards, `shoe` without and with Bluetooth, and holds it against its budgets.
+/// Builds all programs for the boards, `shoe` without and with Bluetooth, and holds it against its budgets; or lints.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.lint {
+        return lint();
+    }
     let boards = match arguments.board {
         Boards::All => &Board::ALL[..],
         Boards::Wb55 => &[Board::Wb55],
@@ -203,7 +209,7 @@ fn build(board: Board, ble: bool, what: &[&str]) -> Result<(), Failure> {
 }
 
 /// Lints the firmware for all boards and for the emulator, without and with Bluetooth, where there is a clippy for the target.
-pub fn lint() -> Result<(), Failure> {
+fn lint() -> Result<(), Failure> {
     let boards = Board::ALL.into_iter().flat_map(|board| [board.features(false), board.features(true)]);
     let boards = boards.map(|features| (FOLDER, features));
     let emulator = ["documented", "ble"].map(|features| (EMULATOR, features.into()));

@@ -1,7 +1,9 @@
 //! The stages of a check run: what ran, how long it took, how much of it passed.
 
-use crate::process::Failure;
+use crate::process::{self, Ended, Failure};
 use std::ops::AddAssign;
+use std::process::Command;
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// Tests and checks counted.
@@ -52,10 +54,34 @@ struct Finished {
     trouble: Option<String>,
 }
 
+/// Stages that run one after the other beside those of a [`Run`], which tells of them when it is joined.
+pub struct Beside(JoinHandle<Vec<RanBeside>>);
+
+/// Its name, how long it took, and how it ended.
+type RanBeside = (&'static str, Duration, Result<Ended, Failure>);
+
+impl Beside {
+    /// Begins with commands that are one check each.
+    pub fn start(stages: Vec<(&'static str, Command)>) -> Self {
+        let run = |(name, mut command)| {
+            let start = Instant::now();
+            let ended = process::watch(&mut command, || true);
+            (name, start.elapsed(), ended)
+        };
+        Self(thread::spawn(move || stages.into_iter().map(run).collect()))
+    }
+}
+
 /// All stages of a run.
-#[derive(Default)]
 pub struct Run {
+    begun: Instant,
     finished: Vec<Finished>,
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self { begun: Instant::now(), finished: Vec::new() }
+    }
 }
 
 impl Run {
@@ -64,8 +90,11 @@ impl Run {
     pub fn stage(&mut self, name: &'static str, work: impl FnOnce() -> (Tally, Result<(), Failure>)) {
         println!("\n=== {name}");
         let start = Instant::now();
-        let (mut tally, result) = work();
-        let time = start.elapsed();
+        let (tally, result) = work();
+        self.finish(name, start.elapsed(), tally, result);
+    }
+
+    fn finish(&mut self, name: &'static str, time: Duration, mut tally: Tally, result: Result<(), Failure>) {
         let trouble = result.err().map(|failure| failure.to_string());
         if trouble.is_some() && tally.failed == 0 {
             tally.failed = 1;
@@ -85,18 +114,32 @@ impl Run {
         });
     }
 
+    /// Waits for the stages that run beside, and tells of them as of any other.
+    pub fn join(&mut self, beside: Beside) {
+        for (name, time, ended) in beside.0.join().expect("what runs commands does not panic") {
+            println!("\n=== {name}, which ran beside others");
+            let result = ended.and_then(|Ended { said, code }| {
+                print!("{}{}", said.err, said.out);
+                // What went wrong is the last that it said.
+                let last = said.err.trim_end().lines().next_back().unwrap_or("it was stopped");
+                let trouble = last.trim_start_matches("error: ").to_owned();
+                if code == Some(0) { Ok(()) } else { Err(Failure::Found(trouble)) }
+            });
+            let tally = if result.is_ok() { Tally::PASSED } else { Tally::default() };
+            self.finish(name, time, tally, result);
+        }
+    }
+
     /// Prints a line for each stage and, last, the sum. Whether everything passed.
     pub fn summary(self) -> bool {
         println!("\n{:<28} {:>8} {:>7} {:>7}", "stage", "time/s", "passed", "failed");
         let mut sum = Tally::default();
-        let mut time = Duration::ZERO;
         for stage in &self.finished {
             let Tally { passed, failed } = stage.tally;
             println!("{:<28} {:>8.1} {passed:>7} {failed:>7}", stage.name, stage.time.as_secs_f64());
             sum += stage.tally;
-            time += stage.time;
         }
-        println!("{:<28} {:>8.1} {:>7} {:>7}\n", "all", time.as_secs_f64(), sum.passed, sum.failed);
+        println!("{:<28} {:>8.1} {:>7} {:>7}\n", "all", self.begun.elapsed().as_secs_f64(), sum.passed, sum.failed);
         for stage in &self.finished {
             if let Some(trouble) = &stage.trouble {
                 println!("{}: {trouble}", stage.name);
@@ -134,6 +177,25 @@ mod tests {
     #[test]
     fn no_summary_counts_nothing() {
         assert_eq!(Tally::of_test_output("error: could not compile"), Tally::default());
+    }
+
+    #[test]
+    fn what_ran_beside_is_counted_and_its_last_words_are_the_trouble() {
+        let shell = |words| {
+            let mut command = Command::new("sh");
+            command.args(["-c", words]);
+            command
+        };
+        let mut run = Run::default();
+        run.join(Beside::start(vec![
+            ("good", shell("true")),
+            ("bad", shell("echo first >&2; echo error: last >&2; exit 1")),
+        ]));
+        let stages: Vec<_> =
+            run.finished.iter().map(|stage| (stage.name, stage.tally, stage.trouble.as_deref())).collect();
+        let failed = Tally { passed: 0, failed: 1 };
+        assert_eq!(stages, [("good", Tally::PASSED, None), ("bad", failed, Some("last"))]);
+        assert!(!run.summary());
     }
 
     #[test]
