@@ -304,6 +304,12 @@ mod tests {
                 let mean = paths.iter().map(|path| f64::from(path[step])).sum::<f64>() / 6.0;
                 prop_assert!((place.position[0] - mean).abs() < 1e-5, "{} {}", place.position[0], mean);
             }
+            let thirds = ancestry.past(&particles, 3, |_| true);
+            prop_assert_eq!(thirds.len(), draws.len());
+            for (step, place) in thirds.iter().enumerate() {
+                let mean = f64::from(paths[0][step] + paths[3][step]) / 2.0;
+                prop_assert!((place.position[0] - mean).abs() < 1e-5, "{} {}", place.position[0], mean);
+            }
         }
     }
 }
