@@ -8,14 +8,13 @@ use crate::gravity::Place;
 use crate::link::address::AddressError;
 use crate::link::connection::Happening;
 use crate::link::event::Event;
+use crate::link::raw::Samples;
 use crate::link::{Address, Connection};
 use crate::recording::{self, Profile, Recording};
 use crate::simulation::sensor::G_M_S2;
 use indicatif::ProgressIterator;
-use sohle_shared::bmx055::Merger;
 use sohle_shared::calibration::{Grade, Parameters};
-use sohle_shared::shoe::celsius;
-use sohle_shared::wire::message::{Action, RawItem};
+use sohle_shared::wire::message::Action;
 use sohle_shared::wire::transfer::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -129,21 +128,11 @@ fn live(connection: &mut Connection, gravity: f64, quiet: bool) -> Result<Conclu
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
     command::connect(connection)?;
     let mut session = Session::new(&Parameters::default(), gravity);
-    let mut merger: Option<Merger> = None;
+    let mut samples = Samples::default();
     let mut fault = None;
     let mut take = |happening: Happening| {
         let Happening::Event(Event::Raw(raw)) = happening else { return };
-        let batch = match (raw.item, &mut merger) {
-            (RawItem::Start(sensor), merger) => {
-                *merger = Some(Merger::new(&sensor));
-                return;
-            }
-            (RawItem::Batch(batch), Some(_)) => batch,
-            _ => return,
-        };
-        let temperature = batch.temperature.map(celsius);
-        let Some(merger) = &mut merger else { return };
-        merger.push(&batch, |sample| {
+        samples.take(&raw.item, |sample, temperature| {
             for line in session.push(sample, temperature) {
                 if !quiet && let Err(error) = print(&format!("{line}\n")) {
                     fault = Some(error);

@@ -17,6 +17,7 @@ pub mod event;
 pub mod ground;
 pub mod line;
 mod questions;
+pub mod raw;
 pub mod recorder;
 pub mod session;
 pub mod transport;

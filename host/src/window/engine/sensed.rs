@@ -1,7 +1,7 @@
 //! What the sensor of a shoe reads, for the plots, where the shoe tells its frames.
 
 use super::signals::{Row, Signal};
-use sohle_shared::bmx055::Merger;
+use crate::link::raw::Samples;
 use sohle_shared::sample::ImuSample;
 use sohle_shared::time::Micros;
 use sohle_shared::wire::message::RawItem;
@@ -9,22 +9,17 @@ use sohle_shared::wire::message::RawItem;
 /// An older sample says nothing of now. **Units:** s.
 const FRESH_S: f32 = 0.2;
 
-/// Puts the frames of both dies together.
+/// The last sample.
 #[derive(Debug, Default)]
 pub struct Sensed {
-    /// Nothing until the shoe has said how its sensor is set.
-    merger: Option<Merger>,
+    samples: Samples,
     last: Option<ImuSample>,
 }
 
 impl Sensed {
     /// Takes in what went into the tracker of the shoe.
     pub fn take(&mut self, item: &RawItem) {
-        match (item, &mut self.merger) {
-            (RawItem::Start(sensor), merger) => *merger = Some(Merger::new(sensor)),
-            (RawItem::Batch(batch), Some(merger)) => merger.push(batch, |sample| self.last = Some(*sample)),
-            (RawItem::Batch(_), None) | (RawItem::Order(_), _) => {}
-        }
+        self.samples.take(item, |sample, _| self.last = Some(*sample));
     }
 
     /// Writes what was read about this time into a row.
