@@ -219,20 +219,13 @@ impl Layout {
     /// Where a plot is in front that is of samples alone, and none of its signals is known, the first that knows one comes
     /// there: who tells no samples at first never does. Others may be known later.
     pub fn show_known(&mut self, is_known: impl Fn(Signal) -> bool) {
-        let knows = |view: &View| match view {
-            View::Plot(number) => {
-                self.plots.get(*number).is_some_and(|plot| plot.signals.iter().any(|signal| is_known(*signal)))
-            }
-            _ => false,
+        let plot = |view: &View| match view {
+            View::Plot(number) => self.plots.get(*number).filter(|plot| !plot.signals.is_empty()),
+            _ => None,
         };
-        let stays_empty = |view: &View| match view {
-            View::Plot(number) => {
-                let plot = self.plots.get(*number);
-                let empty = |signal: &Signal| signal.is_of_samples() && !is_known(*signal);
-                plot.is_some_and(|plot| !plot.signals.is_empty() && plot.signals.iter().all(empty))
-            }
-            _ => false,
-        };
+        let knows = |view: &View| plot(view).is_some_and(|plot| plot.signals.iter().any(|signal| is_known(*signal)));
+        let never = |signal: &Signal| signal.is_of_samples() && !is_known(*signal);
+        let stays_empty = |view: &View| plot(view).is_some_and(|plot| plot.signals.iter().all(never));
         for (_, leaf) in self.dock.iter_leaves_mut() {
             if leaf.tabs.get(leaf.active.0).is_some_and(stays_empty)
                 && let Some(known) = leaf.tabs.iter().position(&knows)

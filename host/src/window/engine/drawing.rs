@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Of the true way, every so many poses are enough.
 const THINNING: usize = 10;
-/// The corrected past is drawn as the mean of so many particles: a thirtieth of their scatter is less than a line is wide.
+/// The corrected past is drawn as the mean of so many particles: a seventeenth of their scatter is less than a line is wide.
 const PAST_BY: usize = 300;
 
 /// Steps, stances, how they lie in the building, and which walk it is: while they are the same, so is the drawing but for the foot.
