@@ -181,9 +181,9 @@ const COUNTS: [usize; 5] = [1_000, 10_000, 50_000, 150_000, 500_000];
 /// How large the map is while it is measured, as in a window of the usual size; and that window.
 const MAP: Sheet = Sheet { size: [920.0, 560.0], pixels_per_point: 1.0, dark: false };
 const WINDOW: Sheet = Sheet { size: [1280.0, 800.0], pixels_per_point: 1.0, dark: false };
-/// A walk is played so many times as fast while steps are measured, and so many of them count.
-const SPEED: f64 = 4.0;
-const STEPS: usize = 200;
+/// A walk is played as fast as it is walked while steps are measured, and so many of them count.
+const SPEED: f64 = 1.0;
+const STEPS: usize = 100;
 
 /// Measures, and tells what came of it.
 fn measured() -> Result<(), Error> {

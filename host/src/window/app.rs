@@ -2,6 +2,7 @@
 
 use super::dialogs::{Dialog, Wanted};
 use super::engine::{Command, Kind, Make, Opening, Snapshot};
+use super::gpu::Frames;
 use super::help;
 use super::layout::{Layout, Look, View};
 use super::map::{Map, Overlay, Scene};
@@ -12,7 +13,7 @@ use eframe::egui::{self, CentralPanel, Context, Panel, ThemePreference, Ui, View
 use egui_dock::{DockArea, Style, TabViewer};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::Instant;
 
 /// All that the window keeps.
 pub struct App {
@@ -28,8 +29,8 @@ pub struct App {
     told: String,
     /// What was opened last.
     opening: Option<Opening>,
-    /// How long the last frame took, where that is measured.
-    frame: Option<Duration>,
+    /// Tells when frames have been drawn.
+    frames: Option<Frames>,
     /// Something was opened of which nothing has been told yet.
     unseen: bool,
 }
@@ -44,6 +45,7 @@ impl App {
         };
         Self {
             shoes: Shoes::default(),
+            frames: None,
             map,
             ground: Arc::new(Scene::open_ground()),
             layout,
@@ -53,9 +55,13 @@ impl App {
             help: false,
             told,
             opening: None,
-            frame: None,
             unseen: false,
         }
+    }
+
+    /// Measures how long pictures take, and tells how long it is from a step to its picture.
+    pub fn measured(self) -> Self {
+        Self { frames: self.map.as_ref().map(|map| Frames::new(map.render())), ..self }
     }
 
     /// Opens something in the place of what is selected, or beside all that is open.
@@ -86,11 +92,6 @@ impl App {
         &mut self.shoes
     }
 
-    /// How long the last frame took, until all of it was drawn.
-    pub fn took(&mut self, frame: Duration) {
-        self.frame = Some(frame);
-    }
-
     /// How it is laid out.
     pub fn layout(&mut self) -> &mut Layout {
         &mut self.layout
@@ -108,7 +109,12 @@ impl App {
 
     /// Draws the window.
     pub fn show(&mut self, ui: &mut Ui) {
-        if self.shoes.look(self.frame.take()) {
+        let begun = Instant::now();
+        if let Some(frames) = &self.frames {
+            frames.drawn().for_each(|frame| self.shoes.drawn(frame));
+            frames.watch(ui, begun);
+        }
+        if self.shoes.look(begun) {
             ui.ctx().send_viewport_cmd(ViewportCommand::Close);
         }
         ui.ctx().set_theme(match self.layout.look {
@@ -213,8 +219,7 @@ impl App {
 }
 
 impl eframe::App for App {
-    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
-        self.frame = frame.info().cpu_usage.map(Duration::from_secs_f32);
+    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
         self.show(ui);
     }
 

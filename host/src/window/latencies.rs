@@ -1,13 +1,16 @@
 //! How long steps take from their arrival to the picture, as the program itself measures it.
 
+use super::gpu::Frame;
 use super::status::Latency;
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// So many of the last steps count.
 const COUNTED: usize = 1_000;
 /// Fewer say nothing.
 const LEAST: usize = 5;
+/// No more frames are on their way to a picture at once.
+const UNDERWAY: usize = 16;
 
 /// Measures.
 #[derive(Debug, Default)]
@@ -15,8 +18,8 @@ pub struct Latencies {
     /// The step that is shown, and whether its picture was painted.
     last: Option<Instant>,
     waiting: Option<Instant>,
-    /// From the arrival of a step to the beginning of the frame that shows it.
-    begun: Option<Duration>,
+    /// Frames that show a step and are not drawn yet: when each began, and when its step arrived.
+    underway: VecDeque<[Instant; 2]>,
     /// **Units:** ms.
     taken: VecDeque<f64>,
 }
@@ -30,16 +33,25 @@ impl Latencies {
         }
     }
 
-    /// A frame begins. How long one takes, until the card has all of it, is known when the next one begins: `before` is what
-    /// the frame before took; nothing where nobody measures that.
-    pub fn frame(&mut self, before: Option<Duration>) {
-        if let (Some(begun), Some(frame)) = (self.begun.take(), before) {
-            if self.taken.len() == COUNTED {
-                self.taken.pop_front();
+    /// A frame begins.
+    pub fn begun(&mut self, frame: Instant) {
+        if let Some(stepped) = self.waiting.take() {
+            if self.underway.len() == UNDERWAY {
+                self.underway.pop_front();
             }
-            self.taken.push_back((begun + frame).as_secs_f64() * 1e3);
+            self.underway.push_back([frame, stepped]);
         }
-        self.begun = self.waiting.take().map(|stepped| stepped.elapsed());
+    }
+
+    /// A frame is drawn.
+    pub fn drawn(&mut self, frame: Frame) {
+        let Some(index) = self.underway.iter().position(|[begun, _]| *begun == frame.begun) else { return };
+        // Frames are drawn in their order: one before it that was not told of will not be.
+        let [_, stepped] = self.underway.drain(..=index).next_back().expect("it is one of them");
+        if self.taken.len() == COUNTED {
+            self.taken.pop_front();
+        }
+        self.taken.push_back(frame.drawn.saturating_duration_since(stepped).as_secs_f64() * 1e3);
     }
 
     /// What came of it, once there were enough steps.
@@ -57,31 +69,42 @@ impl Latencies {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     #[test]
-    fn each_step_counts_once_when_its_frame_is_done() {
+    fn each_step_counts_once_when_its_frame_is_drawn() {
         let mut latencies = Latencies::default();
         let start = Instant::now();
-        let frame = Some(Duration::from_millis(100));
-        for index in 0..10_u32 {
-            let stepped = start.checked_sub(Duration::from_millis(u64::from(index) + 1));
-            latencies.arrived(stepped);
-            latencies.frame(frame);
-            latencies.arrived(stepped);
-            assert_eq!(latencies.told().is_some(), index >= LEAST as u32, "{index}");
-            latencies.frame(frame);
+        let at = |ms: u64| start + Duration::from_millis(ms);
+        for index in 0..10_u64 {
+            let stepped = at(1_000 * index);
+            // The frame begins 1 to 10 ms after the step; the next one begins before it is drawn, and shows the same step.
+            let frames = [at(1_000 * index + index + 1), at(1_000 * index + 50)];
+            for frame in frames {
+                latencies.arrived(Some(stepped));
+                latencies.begun(frame);
+            }
+            assert_eq!(latencies.told().is_some(), index >= LEAST as u64, "{index}");
+            for begun in frames {
+                latencies.drawn(Frame { begun, drawn: begun + Duration::from_millis(100) });
+            }
         }
         let told = latencies.told().unwrap();
-        assert!(latencies.taken.len() == 10 && told.median_ms >= 105.0 && told.p99_ms >= 110.0, "{told:?}");
+        assert_eq!((told.steps, told.median_ms, told.p99_ms), (10, 106.0, 110.0));
     }
 
     #[test]
-    fn a_frame_that_nobody_measures_is_not_counted() {
+    fn a_frame_that_nobody_tells_of_is_not_counted() {
         let mut latencies = Latencies::default();
-        for _ in 0..2 * LEAST {
-            latencies.arrived(Some(Instant::now()));
-            latencies.frame(None);
+        let start = Instant::now();
+        for index in 0..3 * UNDERWAY as u64 {
+            let frame = start + Duration::from_secs(index);
+            latencies.arrived(Some(frame));
+            latencies.begun(frame);
         }
-        assert!(latencies.told().is_none() && latencies.taken.is_empty());
+        assert!(latencies.told().is_none() && latencies.underway.len() == UNDERWAY);
+        let [begun, _] = latencies.underway[3];
+        latencies.drawn(Frame { begun, drawn: begun + Duration::from_millis(7) });
+        assert_eq!((latencies.taken.make_contiguous(), latencies.underway.len()), (&mut [7.0][..], UNDERWAY - 4));
     }
 }

@@ -33,6 +33,9 @@ pub struct Measured {
 
 /// Between two looks, as a display with 60 pictures a second has them.
 const FRAME: Duration = Duration::from_micros(16_667);
+/// So often it is looked whether a frame is asked for; and one is drawn at last.
+const LOOK: Duration = Duration::from_micros(500);
+const IDLE: Duration = Duration::from_millis(500);
 /// Nothing takes longer.
 const PATIENCE: Duration = Duration::from_secs(300);
 /// The rooms of the twin that are walked to, over and over.
@@ -62,10 +65,15 @@ pub fn latency(
         Ok(Box::new(Replay::new(walk)) as Box<dyn Source>)
     };
     let mut make = Some(make);
-    let mut app = App::new(Some(Map::quick(studio.render())), None);
+    let mut app = App::new(Some(Map::quick(studio.render())), None).measured();
     let begun = Instant::now();
     let mut fast = false;
     loop {
+        let frame = Instant::now();
+        // A window draws when it is asked to, and no more often than its display can show.
+        while make.is_none() && !studio.is_asked() && frame.elapsed() < IDLE {
+            std::thread::sleep(LOOK);
+        }
         let frame = Instant::now();
         studio.frame(sheet, |ui| {
             if let Some(make) = make.take() {
@@ -73,7 +81,6 @@ pub fn latency(
             }
             app.show(ui);
         })?;
-        app.took(frame.elapsed());
         let snapshot = app.snapshot();
         told(snapshot.steps.min(steps) as u64);
         let over = snapshot.kind == Kind::Replay && (snapshot.steps > steps || !snapshot.pace.playing);

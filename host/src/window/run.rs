@@ -52,7 +52,7 @@ pub fn window(first: Vec<First>, layout: Option<PathBuf>, duration: Option<Durat
         "sohle",
         options,
         Box::new(move |creation| {
-            let mut app = App::new(creation.wgpu_render_state.as_ref().map(Map::quick), layout);
+            let mut app = App::new(creation.wgpu_render_state.as_ref().map(Map::quick), layout).measured();
             for (index, first) in first.into_iter().enumerate() {
                 match first {
                     First::Opening(opening) => app.open(*opening, &creation.egui_ctx, index > 0),

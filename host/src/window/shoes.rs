@@ -1,6 +1,7 @@
 //! What is open: one shoe or recording, or several, of which one is selected and has its details shown.
 
 use super::engine::{Command, Engine, Kind, Make, Snapshot};
+use super::gpu::Frame;
 use super::latencies::Latencies;
 use super::map::palette::colour;
 use super::map::{Overlay, Rgb, Role, Scene};
@@ -80,20 +81,24 @@ impl Shoes {
         }
     }
 
-    /// Looks for what is new, for a frame that begins; the one before took `before`. Whether somebody opened something for so
-    /// long and no longer.
-    pub fn look(&mut self, before: Option<Duration>) -> bool {
+    /// Looks for what is new, for a frame that begins. Whether somebody opened something for so long and no longer.
+    pub fn look(&mut self, frame: Instant) -> bool {
         for shoe in &mut self.open {
             if let Some(snapshot) = shoe.engine.take() {
                 shoe.latencies.arrived(snapshot.stepped);
                 shoe.snapshot = snapshot;
             }
-            shoe.latencies.frame(before);
-            if let Some(picture) = before {
-                shoe.engine.drawn_in(picture);
-            }
+            shoe.latencies.begun(frame);
         }
         self.open.iter().any(|shoe| shoe.snapshot.ended)
+    }
+
+    /// A frame is drawn.
+    pub fn drawn(&mut self, frame: Frame) {
+        for shoe in &mut self.open {
+            shoe.latencies.drawn(frame);
+            shoe.engine.drawn_in(frame.drawn.saturating_duration_since(frame.begun));
+        }
     }
 
     /// How many are open.

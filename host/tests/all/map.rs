@@ -11,9 +11,11 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use sohle::building::{Building, geojson};
 use sohle::particle::{Cluster, Particle};
 use sohle::window::cube::Cube;
+use sohle::window::gpu::Frames;
 use sohle::window::gpu::offscreen::{Picture, Sheet, Studio};
 use sohle::window::map::{Cloud, Foot, Map, Overlay, Person, Projection, Response, Rgb, Role, Scene, Track, View};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// Colours as the map has them on light ground.
 const GREEN: Rgb = [0x16, 0xa3, 0x4a];
@@ -125,6 +127,25 @@ fn particles_and_paths_are_drawn_and_can_be_left_out() {
         let [green, red, violet] = [GREEN, RED, VIOLET].map(|rgb| count(&bare, rgb));
         assert!(green < 10 && red < 80 && violet > 200, "{projection:?}: {green} {red} {violet}");
     }
+}
+
+#[test]
+fn frames_are_told_of_when_they_are_drawn() {
+    let Some(mut studio) = studio() else { return };
+    let frames = Frames::new(studio.render());
+    let mut begun = Vec::new();
+    for _ in 0..3 {
+        begun.push(Instant::now());
+        studio.frame(SHEET, |ui| frames.watch(ui, begun[begun.len() - 1])).unwrap();
+    }
+    let mut drawn = Vec::new();
+    let patience = Instant::now() + Duration::from_secs(20);
+    while drawn.len() < begun.len() && Instant::now() < patience {
+        drawn.extend(frames.drawn());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(drawn.iter().map(|frame| frame.begun).collect::<Vec<_>>(), begun);
+    assert!(drawn.iter().all(|frame| frame.drawn > frame.begun));
 }
 
 /// It belongs to the way without the map, and is left out with it.

@@ -3,10 +3,12 @@
 //! A view that did not change is not drawn again: the picture of it is still there. It has several samples a pixel and
 //! a depth of its own, whatever the window has.
 
+mod frames;
 pub mod offscreen;
 mod pipeline;
 mod target;
 
+pub use frames::{Frame, Frames};
 pub use pipeline::{Blend, Depth, Kind, Pipelines, uniform};
 pub use target::{Care, Target};
 

@@ -86,6 +86,11 @@ impl Studio {
         format!("{} ({:?})", adapter.name, adapter.backend)
     }
 
+    /// Whether somebody asked for another frame.
+    pub fn is_asked(&self) -> bool {
+        self.context.has_requested_repaint()
+    }
+
     /// Draws one frame and waits until it is there.
     ///
     /// # Errors

@@ -146,6 +146,11 @@ impl Painter {
         }
     }
 
+    /// What it draws with.
+    pub fn render(&self) -> &RenderState {
+        &self.render
+    }
+
     /// The picture; drawn only if something is not as it was.
     pub fn paint(&mut self, scene: &Arc<Scene>, overlay: &Overlay, look: &Look<'_>) -> TextureId {
         let size = (look.sight.rect().size() * look.pixels_per_point).round();

@@ -95,6 +95,11 @@ impl Map {
         Self { painter: Painter::new(render, care), glide: None, shown: None, ruler: Ruler::default(), picked: None }
     }
 
+    /// What it draws with.
+    pub fn render(&self) -> &RenderState {
+        self.painter.render()
+    }
+
     /// Shows all of the building, or all of the walk where there is none.
     pub fn fit(&self, view: &View, scene: &Scene, overlay: &Overlay, rect: Rect) -> Camera {
         let spread = spread(view);
