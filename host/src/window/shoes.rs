@@ -26,6 +26,9 @@ const COLOURS: [Rgb; 7] = [
 /// A shoe that has gone is not waited for longer than its own answers take.
 pub const PATIENCE: Duration = Duration::from_secs(25);
 
+/// Who asks for a frame without any delay gets two, and the next step waits until the second is drawn too.
+const AT_ONCE: Duration = Duration::from_nanos(1);
+
 /// One of them.
 struct Shoe {
     engine: Engine,
@@ -63,7 +66,7 @@ impl Shoes {
         let colour = COLOURS.into_iter().find(|colour| !taken.contains(colour));
         let context = context.clone();
         self.open.push(Shoe {
-            engine: Engine::start(name, make, move || context.request_repaint()),
+            engine: Engine::start(name, make, move || context.request_repaint_after(AT_ONCE)),
             snapshot: Arc::default(),
             latencies: Latencies::default(),
             colour: colour.unwrap_or(COLOURS[self.open.len() % COLOURS.len()]),

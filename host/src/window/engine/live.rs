@@ -250,7 +250,8 @@ impl Source for Live {
         }
         // The work itself waits for what comes.
         let stepped = self.heard.stepped != before;
-        Work { changed: self.heard.fresh, stepped, pause: Some(Duration::ZERO) }
+        let stands = self.heard.attitude.as_ref().is_some_and(|attitude| attitude.stance);
+        Work { changed: self.heard.fresh, stepped, stands, pause: Some(Duration::ZERO) }
     }
 
     fn snapshot(&mut self) -> Snapshot {

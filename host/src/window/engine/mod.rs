@@ -71,6 +71,8 @@ pub struct Work {
     pub changed: bool,
     /// It is a step, which is shown at once.
     pub stepped: bool,
+    /// The foot stands: nothing moves, and a step is about to come.
+    pub stands: bool,
     /// How long there is nothing to do; nothing until a command comes.
     pub pause: Option<Duration>,
 }
@@ -96,6 +98,10 @@ const TURN: Duration = Duration::from_millis(10);
 /// for computing.
 const FRAME: Duration = Duration::from_millis(16);
 const FRAMES: u32 = 2;
+/// Where pictures are slow, a foot that stands is shown for so long, and then not until its step has come, which would wait
+/// for a picture that shows nothing new; but no longer than steps take to come.
+const STANDS: Duration = Duration::from_millis(120);
+const STOOD: Duration = Duration::from_millis(1_050);
 /// A single picture that took for ever does not keep others back.
 const SLOWEST: Duration = Duration::from_millis(500);
 /// Between two looks for commands when there is nothing to do.
@@ -157,10 +163,13 @@ fn run(source: &mut dyn Source, asked: &Receiver<Command>, picture_us: &AtomicU3
     publish(source.snapshot());
     let (mut published, mut stepped) = (Instant::now(), None::<Instant>);
     let (mut dirty, mut pause) = (false, Some(Duration::ZERO));
+    let mut stands = None::<Instant>;
     loop {
         let picture = Duration::from_micros(picture_us.load(Ordering::Relaxed).into());
         let frame = (FRAMES * picture).clamp(FRAME, SLOWEST);
-        let due = dirty.then(|| frame.saturating_sub(published.elapsed()));
+        let stood = stands.map(|since: Instant| since.elapsed()).filter(|stood| (STANDS..STOOD).contains(stood));
+        let held = stood.filter(|_| picture > FRAME).map_or(Duration::ZERO, |stood| STOOD - stood);
+        let due = dirty.then(|| frame.saturating_sub(published.elapsed()).max(held));
         let wait = pause.unwrap_or(IDLE).min(due.unwrap_or(IDLE));
         match asked.recv_timeout(wait) {
             Ok(command) => {
@@ -174,9 +183,10 @@ fn run(source: &mut dyn Source, asked: &Receiver<Command>, picture_us: &AtomicU3
         let work = source.work(Instant::now() + TURN);
         dirty |= work.changed;
         pause = work.pause;
+        stands = work.stands.then(|| stands.unwrap_or_else(Instant::now));
         // Of steps that come all at once, not each has a picture.
         let step = work.stepped && stepped.is_none_or(|before| before.elapsed() >= FRAME);
-        if dirty && (step || published.elapsed() >= frame) {
+        if dirty && (step || held.is_zero() && published.elapsed() >= frame) {
             publish(source.snapshot());
             published = Instant::now();
             stepped = if step { Some(published) } else { stepped };
@@ -193,13 +203,15 @@ mod tests {
     /// Always something new, and a step when that is said.
     struct Restless {
         stepped: bool,
+        stands: bool,
     }
 
     impl Source for Restless {
         fn obey(&mut self, _: Command) {}
 
         fn work(&mut self, _: Instant) -> Work {
-            Work { changed: true, stepped: std::mem::take(&mut self.stepped), pause: Some(Duration::from_millis(1)) }
+            let stepped = std::mem::take(&mut self.stepped);
+            Work { changed: true, stepped, stands: self.stands, pause: Some(Duration::from_millis(1)) }
         }
 
         fn snapshot(&mut self) -> Snapshot {
@@ -207,17 +219,17 @@ mod tests {
         }
     }
 
-    /// Snapshots in about a tenth of a second, where a picture takes so long; and how long it was.
-    fn published(picture: Duration, stepped: bool) -> (usize, Duration) {
+    /// Snapshots in about so long, where a picture takes some time; and how long it was.
+    fn published(mut source: Restless, picture: Duration, time: Duration) -> (usize, Duration) {
         let (commands, asked) = mpsc::channel();
         let count = Cell::new(0);
         let begun = Instant::now();
         let ends = std::thread::spawn(move || {
-            std::thread::sleep(Duration::from_millis(100));
+            std::thread::sleep(time);
             drop(commands);
         });
         let picture_us = AtomicU32::new(picture.as_micros() as u32);
-        run(&mut Restless { stepped }, &asked, &picture_us, |_| count.set(count.get() + 1));
+        run(&mut source, &asked, &picture_us, |_| count.set(count.get() + 1));
         ends.join().unwrap();
         (count.get(), begun.elapsed())
     }
@@ -227,10 +239,26 @@ mod tests {
         for (picture, stepped) in [(0, false), (100, false), (100, true), (9_000, true)] {
             let picture = Duration::from_millis(picture);
             let interval = (FRAMES * picture).clamp(FRAME, SLOWEST);
-            let (count, time) = published(picture, stepped);
+            let source = Restless { stepped, stands: false };
+            let (count, time) = published(source, picture, Duration::from_millis(100));
             let least = 1 + usize::from(stepped);
             let most = least + (time.as_secs_f64() / interval.as_secs_f64()) as usize;
             assert!((least..=most).contains(&count), "{picture:?} {stepped}: {count} in {time:?}");
         }
+    }
+
+    #[test]
+    fn a_foot_that_stands_is_shown_for_a_moment_and_then_not_until_its_step_or_a_second_is_over() {
+        let stands = || Restless { stepped: false, stands: true };
+        let slow = Duration::from_millis(20);
+        // Of 0.6 s the first 0.12; a machine that is busy shows fewer.
+        let (count, _) = published(stands(), slow, Duration::from_millis(600));
+        assert!(count <= 2 + (STANDS.as_millis() / 40) as usize, "{count}");
+        // Who stands for longer is seen again.
+        let (long, time) = published(stands(), slow, Duration::from_millis(1_800));
+        assert!(long > count || time < STOOD, "{long} {count}");
+        // Where pictures are quick nothing is held back.
+        let (quick, time) = published(stands(), Duration::ZERO, Duration::from_millis(600));
+        assert!(quick > count, "{quick} {count} in {time:?}");
     }
 }

@@ -185,7 +185,7 @@ impl Source for Replay {
             Goal::Here if self.pace.speed.is_finite() => Some(TICK),
             _ => Some(Duration::ZERO),
         };
-        Work { changed: after != before, stepped, pause }
+        Work { changed: after != before, stepped, stands: self.pace.playing && self.walk.now().stance, pause }
     }
 
     fn snapshot(&mut self) -> Snapshot {
