@@ -2,14 +2,17 @@
 
 use super::dialogs::{Dialog, Wanted};
 use super::engine::{Command, Kind, Make, Opening, Snapshot};
-use super::gpu::Frames;
+use super::gpu::{self, Frames};
 use super::help;
 use super::layout::{Layout, Look, View};
 use super::map::{Map, Overlay, Scene};
 use super::parameters::Editor;
 use super::shoes::Shoes;
 use super::{plots, saving, selector, status, toolbar};
-use eframe::egui::{self, CentralPanel, Context, Panel, ThemePreference, Ui, ViewportCommand, WidgetText};
+use eframe::egui::{
+    self, CentralPanel, Color32, Context, Frame, Panel, ThemePreference, Ui, ViewportCommand, Visuals, WidgetText,
+};
+use eframe::wgpu::TextureFormat;
 use egui_dock::{DockArea, Style, TabViewer};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,6 +36,8 @@ pub struct App {
     frames: Option<Frames>,
     /// Something was opened of which nothing has been told yet.
     unseen: bool,
+    /// Of the window that is drawn into.
+    format: TextureFormat,
 }
 
 impl App {
@@ -56,6 +61,7 @@ impl App {
             told,
             opening: None,
             unseen: false,
+            format: TextureFormat::Rgba8Unorm,
         }
     }
 
@@ -122,20 +128,25 @@ impl App {
             Look::Light => ThemePreference::Light,
             Look::Dark => ThemePreference::Dark,
         });
+        let fine = self.map.as_ref().is_none_or(|map| map.care().fine);
+        ui.ctx().tessellation_options_mut(|options| options.feathering = fine);
         let mut commands = Vec::new();
         let snapshot = self.shoes.snapshot().clone();
         if self.unseen && snapshot.signals.span().is_some() {
             self.unseen = false;
             self.layout.show_known(|signal| snapshot.signals.knows(signal));
         }
-        let asked = Panel::top("toolbar").show(ui, |ui| toolbar::show(ui, &snapshot, &mut commands)).inner;
-        Panel::bottom("bar").show(ui, |ui| {
+        // What is behind everything has the colour of panels and views already.
+        let bare = Frame::side_top_panel(ui.style()).fill(Color32::TRANSPARENT);
+        let asked = Panel::top("toolbar").frame(bare).show(ui, |ui| toolbar::show(ui, &snapshot, &mut commands)).inner;
+        Panel::bottom("bar").frame(bare).show(ui, |ui| {
             ui.add_space(2.0);
             toolbar::bar(ui, &snapshot, &self.told, &mut commands);
             ui.add_space(2.0);
         });
         if self.layout.selector {
             Panel::left("views")
+                .frame(bare)
                 .default_size(160.0)
                 .show(ui, |ui| selector::show(ui, &mut self.layout, &mut self.shoes));
         }
@@ -163,6 +174,7 @@ impl App {
         let Layout { map: map_view, cube, plots, dock, .. } = &mut self.layout;
         let drawing = self.shoes.drawing();
         let mut views = Views {
+            fine: self.map.as_ref().is_none_or(|map| map.care().fine),
             snapshot,
             drawing: &drawing,
             person: None,
@@ -219,8 +231,15 @@ impl App {
 }
 
 impl eframe::App for App {
-    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+        if let Some(render) = frame.wgpu_render_state() {
+            self.format = render.target_format;
+        }
         self.show(ui);
+    }
+
+    fn clear_color(&self, visuals: &Visuals) -> [f32; 4] {
+        gpu::background(visuals, self.format)
     }
 
     fn on_exit(&mut self) {
@@ -235,6 +254,8 @@ impl eframe::App for App {
 
 /// What the views need.
 struct Views<'a> {
+    /// Whether there is a graphics card for what is fine.
+    fine: bool,
     snapshot: &'a Snapshot,
     drawing: &'a (Option<Arc<Scene>>, Overlay),
     /// Who was clicked on the map.
@@ -293,7 +314,7 @@ impl TabViewer for Views<'_> {
             View::Parameters => self.editor.show(ui, self.snapshot, self.commands),
             View::Plot(number) => {
                 if let Some(plot) = self.plots.get_mut(*number) {
-                    plots::show(ui, *number, plot, self.snapshot, self.commands);
+                    plots::show(ui, *number, plot, self.snapshot, self.fine, self.commands);
                 }
             }
         }
@@ -301,5 +322,10 @@ impl TabViewer for Views<'_> {
 
     fn scroll_bars(&self, _: &View) -> [bool; 2] {
         [false, false]
+    }
+
+    fn clear_background(&self, _: &View) -> bool {
+        // A view has the colour of what is behind it, in the window and in a window of its own.
+        false
     }
 }

@@ -19,7 +19,9 @@ const LEAST: f64 = 1e-6;
 const WHEEL: f32 = 300.0;
 
 /// Shows a plot, and what it asks for.
-pub fn show(ui: &mut Ui, number: usize, plot: &mut Plot, snapshot: &Snapshot, asked: &mut Vec<Command>) {
+///
+/// Where it is not to be `fine`, a curve goes up and down once in two points of the width, not in each.
+pub fn show(ui: &mut Ui, number: usize, plot: &mut Plot, snapshot: &Snapshot, fine: bool, asked: &mut Vec<Command>) {
     let seen = snapshot.time;
     ui.horizontal(|ui| {
         ui.menu_button("Signals", |ui| signals(ui, plot, snapshot));
@@ -98,7 +100,7 @@ pub fn show(ui: &mut Ui, number: usize, plot: &mut Plot, snapshot: &Snapshot, as
             }
             let bounds = ui.plot_bounds();
             let range = [bounds.min()[0], bounds.max()[0]];
-            let columns = ui.response().rect.width() as usize;
+            let columns = ui.response().rect.width() as usize / if fine { 1 } else { 2 };
             for (index, signal) in plot.signals.iter().enumerate() {
                 let curve = signals.curve(*signal, range, columns);
                 let points: PlotPoints<'_> = curve.into_iter().map(|[time, value]| [time, scale(value)]).collect();

@@ -13,7 +13,9 @@ use sohle::particle::{Cluster, Particle};
 use sohle::window::cube::Cube;
 use sohle::window::gpu::Frames;
 use sohle::window::gpu::offscreen::{Picture, Sheet, Studio};
-use sohle::window::map::{Cloud, Foot, Map, Overlay, Person, Projection, Response, Rgb, Role, Scene, Track, View};
+use sohle::window::map::{
+    Camera, Cloud, Foot, Map, Overlay, Person, Projection, Response, Rgb, Role, Scene, Track, View,
+};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -126,6 +128,48 @@ fn particles_and_paths_are_drawn_and_can_be_left_out() {
         // What is left of red is the needle to the north.
         let [green, red, violet] = [GREEN, RED, VIOLET].map(|rgb| count(&bare, rgb));
         assert!(green < 10 && red < 80 && violet > 200, "{projection:?}: {green} {red} {violet}");
+    }
+}
+
+#[test]
+fn ways_lie_under_whole_floors_and_on_those_of_glass() {
+    let Some(mut studio) = studio() else { return };
+    let drawn = Overlay { people: vec![], clouds: vec![], clusters: Vec::new().into(), ..overlay() };
+    let mut seen = |level: i32, hidden: &[i32]| {
+        let view = View { level: Some(level), hidden: hidden.iter().copied().collect(), ..View::default() };
+        count(&picture(&mut studio, SHEET, &view, &drawn), VIOLET)
+    };
+    let [below, glass, alone] = [seen(2, &[]), seen(0, &[]), seen(0, &[1, 2])];
+    // What is left below is the line in the legend.
+    assert!(below < 80 && glass > 5 * below && alone > 5 * below, "{below} {glass} {alone}");
+}
+
+/// Where software draws, the building is kept from one picture to the next.
+#[test]
+fn what_is_kept_between_steps_looks_like_what_is_drawn_anew() {
+    let Some(mut studio) = studio() else { return };
+    let scene = Arc::new(Scene::of(&building("institute")));
+    let (before, after) = (Overlay { tracks: vec![], ..overlay() }, overlay());
+    for projection in [Projection::Orbit, Projection::Flat] {
+        let view = View { projection, ..View::default() };
+        let mut map = Map::quick(studio.render());
+        let mut draw = |map: &mut Map, view: &mut View, overlay: &Overlay| {
+            studio.picture(SHEET, |ui| drop(map.show(ui, view, &scene, overlay))).unwrap().pixels
+        };
+        let mut seen = view.clone();
+        let first = draw(&mut map, &mut seen, &before);
+        let kept = draw(&mut map, &mut seen, &after);
+        assert!(first != kept);
+        let mut fresh = seen.clone();
+        let mut other = Map::quick(map.render());
+        assert!(kept == draw(&mut other, &mut fresh, &after), "{projection:?}: a step");
+        // Turned, the building is elsewhere; and back again as it was.
+        let camera = seen.camera.unwrap();
+        seen.camera = Some(Camera { bearing: camera.bearing + 0.3, ..camera });
+        let turned = draw(&mut map, &mut seen, &after);
+        assert!(turned != kept, "{projection:?}: turned");
+        seen.camera = Some(camera);
+        assert!(kept == draw(&mut map, &mut seen, &after), "{projection:?}: turned back");
     }
 }
 

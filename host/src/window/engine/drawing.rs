@@ -10,8 +10,8 @@ use crate::recording::Recording;
 use crate::window::map::{Cloud, Foot, Overlay, Person, Role, Track};
 use std::sync::Arc;
 
-/// Of the true way, every so many poses are enough.
-const THINNING: usize = 10;
+/// Of the true way, poses so far from one another are enough: a line is as wide on a map of a building. **Units:** m.
+const THINNING_M: f64 = 0.25;
 /// The corrected past is drawn as the mean of so many particles: a seventeenth of their scatter is less than a line is wide.
 const PAST_BY: usize = 300;
 
@@ -32,7 +32,7 @@ impl Drawing {
     /// Of a recording, which may know the truth in the building that it is followed in.
     pub fn of(recording: &Recording, building: Option<&str>) -> Self {
         let truth = building.and_then(|name| recording.truth_in(name)).map(|truth| {
-            let way = truth.poses.iter().step_by(THINNING).map(|pose| pose.position).collect();
+            let way = thinned(truth.poses.iter().map(|pose| pose.position));
             track("truth", Role::Truth, vec![way])
         });
         Self { truth, ..Self::default() }
@@ -140,6 +140,22 @@ fn with_foot(mut overlay: Overlay, followed: &Followed<'_>, foot: [f64; 3]) -> O
     overlay
 }
 
+/// Places that are not close to the one before; and the first and the last.
+fn thinned(way: impl Iterator<Item = [f64; 3]>) -> Vec<[f64; 3]> {
+    let mut kept: Vec<[f64; 3]> = Vec::new();
+    let mut last = None;
+    for place in way {
+        let far = |from: &[f64; 3]| nalgebra::distance(&(*from).into(), &place.into()) >= THINNING_M;
+        let keep = kept.last().is_none_or(far);
+        last = (!keep).then_some(place);
+        if keep {
+            kept.push(place);
+        }
+    }
+    kept.extend(last);
+    kept
+}
+
 fn track(name: &str, role: Role, pieces: Vec<Vec<[f64; 3]>>) -> Track {
     Track { name: name.into(), role, colour: None, pieces: pieces.into() }
 }
@@ -165,6 +181,17 @@ mod tests {
             quality: StepQuality::default(),
             clipped: ClippedSamples::default(),
         }
+    }
+
+    #[test]
+    fn a_way_keeps_its_ends_and_where_it_goes() {
+        let way: Vec<[f64; 3]> = (0..1_000).map(|index| [0.01 * f64::from(index), 0.0, 0.0]).collect();
+        let kept = thinned(way.iter().copied());
+        assert_eq!((kept.first(), kept.last()), (way.first(), way.last()));
+        assert!((39..=42).contains(&kept.len()), "{}", kept.len());
+        assert!(kept.windows(2).all(|pair| pair[1][0] - pair[0][0] < THINNING_M + 0.011), "{kept:?}");
+        assert_eq!(thinned([[1.0; 3]; 5].into_iter()), [[1.0; 3]; 2]);
+        assert!(thinned(std::iter::empty()).is_empty());
     }
 
     /// The map is drawn anew for another way, which takes its time where there is no graphics card.

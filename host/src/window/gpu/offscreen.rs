@@ -1,7 +1,7 @@
 //! Drawing without a window: for measuring, for pictures in files, and for tests.
 
 use super::target::FORMAT;
-use super::{DITHERING, RenderState};
+use super::{DITHERING, RenderState, background};
 use eframe::egui::{self, Context, FullOutput, RawInput, Rect, Theme, Ui, vec2};
 use eframe::egui_wgpu::{RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use eframe::wgpu;
@@ -159,10 +159,12 @@ impl Studio {
         }
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut commands = renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
+        let [r, g, b, a] = background(&self.context.global_style().visuals, FORMAT).map(f64::from);
+        let behind = wgpu::Color { r, g, b, a };
         let attachment = wgpu::RenderPassColorAttachment {
             view: &view,
             resolve_target: None,
-            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
+            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(behind), store: wgpu::StoreOp::Store },
             depth_slice: None,
         };
         let mut pass = encoder

@@ -18,6 +18,17 @@ pub enum Depth {
     Ignored,
 }
 
+/// What happens to the number of the layer that is seen at a pixel, which counts from 1, and is 0 where there is nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// It plays no part.
+    Ignored,
+    /// It becomes the one that is being drawn.
+    Noted,
+    /// Drawn where no higher layer is seen.
+    NotAbove,
+}
+
 /// What happens to the colour that is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blend {
@@ -42,6 +53,8 @@ pub struct Kind<'a> {
     pub instanced: bool,
     /// What happens to the depth.
     pub depth: Depth,
+    /// What happens to the layer.
+    pub layer: Layer,
     /// What happens to the colour.
     pub blend: Blend,
 }
@@ -100,6 +113,12 @@ impl<'a> Pipelines<'a> {
             Depth::Behind => (false, wgpu::CompareFunction::Greater),
             Depth::Ignored => (false, wgpu::CompareFunction::Always),
         };
+        let (compare_layer, pass_op) = match kind.layer {
+            Layer::Ignored => (wgpu::CompareFunction::Always, wgpu::StencilOperation::Keep),
+            Layer::Noted => (wgpu::CompareFunction::Always, wgpu::StencilOperation::Replace),
+            Layer::NotAbove => (wgpu::CompareFunction::GreaterEqual, wgpu::StencilOperation::Keep),
+        };
+        let layer = wgpu::StencilFaceState { compare: compare_layer, pass_op, ..wgpu::StencilFaceState::IGNORE };
         let blend = match kind.blend {
             Blend::Opaque => None,
             Blend::Translucent => Some(wgpu::BlendState::ALPHA_BLENDING),
@@ -118,7 +137,12 @@ impl<'a> Pipelines<'a> {
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(write),
                 depth_compare: Some(compare),
-                stencil: wgpu::StencilState::default(),
+                stencil: wgpu::StencilState {
+                    front: layer,
+                    back: layer,
+                    read_mask: 0xff,
+                    write_mask: if kind.layer == Layer::Noted { 0xff } else { 0 },
+                },
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState { count: self.samples, ..Default::default() },

@@ -18,13 +18,15 @@ pub struct Letters<'a> {
     painter: &'a Painter,
     palette: &'a Palette,
     rect: Rect,
+    /// Rims are drawn in all directions, not in every other.
+    fine: bool,
     taken: Vec<Rect>,
 }
 
 impl<'a> Letters<'a> {
     /// On a map where nothing is written yet.
-    pub fn new(painter: &'a Painter, palette: &'a Palette, rect: Rect) -> Self {
-        Self { painter, palette, rect, taken: Vec::new() }
+    pub fn new(painter: &'a Painter, palette: &'a Palette, rect: Rect, fine: bool) -> Self {
+        Self { painter, palette, rect, fine, taken: Vec::new() }
     }
 
     /// Keeps a part of the map free.
@@ -43,9 +45,9 @@ impl<'a> Letters<'a> {
     /// Writes with a rim, wherever something is written already.
     fn write(&mut self, galley: &Arc<Galley>, at: Pos2) {
         let rim = colour(self.palette.halo).gamma_multiply(0.8);
-        for offset in
-            [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [-0.7, -0.7], [0.7, 0.7], [-0.7, 0.7], [0.7, -0.7]]
-        {
+        let offsets =
+            [[-0.7, -0.7], [0.7, 0.7], [-0.7, 0.7], [0.7, -0.7], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
+        for offset in offsets.into_iter().take(if self.fine { 8 } else { 4 }) {
             self.painter.galley_with_override_text_color(at + Vec2::from(offset), galley.clone(), rim);
         }
         self.painter.galley(at, galley.clone(), Color32::PLACEHOLDER);

@@ -1,19 +1,24 @@
 //! Draws the map on the graphics card: what is the same as before is neither sent nor drawn again.
+//!
+//! First all surfaces of the building, from the highest floor to the lowest, so that what is hidden is not drawn at all; then
+//! particles and ways on them. Where someone looks from the same place as before only the latter are drawn.
 
 use super::camera::{Projection, Sight};
 use super::marks::{self, Cloud, Strokes};
 use super::overlay::Overlay;
 use super::palette::{Palette, shares};
-use super::scene::Scene;
+use super::scene::{Scene, Storey};
 use super::view::Layers;
-use crate::window::gpu::{Blend, Care, Depth, Kind, Pipelines, RenderState, Target, uniform};
-use eframe::egui::TextureId;
+use crate::window::gpu::{Blend, Care, Depth, Kind, Layer, Pane, Pipelines, RenderState, Target, uniform};
 use eframe::wgpu::{self, util::DeviceExt};
 use std::num::NonZeroU64;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Floats of the block that is the same for everything; see the shader.
 const GLOBALS: usize = 16 + 4 * 5 + 4 * super::palette::MATERIALS;
+/// Which of them is the opacity of particles.
+const OPACITY: usize = 16 + 4 * 2 + 1;
 /// Blocks of floors begin at multiples of this; every adapter can do that. **Units:** bytes.
 const STEP: u32 = 256;
 /// Of the numbers of a floor. **Units:** bytes.
@@ -53,13 +58,22 @@ pub struct Look<'a> {
     pub layers: Layers,
 }
 
-/// What was drawn last.
-#[derive(Debug, PartialEq)]
-struct Drawn {
+/// What decides what the surfaces look like.
+#[derive(Clone, Debug, PartialEq)]
+struct Surfaces {
     globals: Vec<f32>,
     storeys: Vec<f32>,
-    layers: Layers,
     size: [u32; 2],
+    /// Which scene it was.
+    scene: u64,
+}
+
+/// What decides what is drawn on them.
+#[derive(Clone, Debug, PartialEq)]
+struct Marks {
+    layers: Layers,
+    /// Of particles.
+    opacity: f32,
     change: u64,
 }
 
@@ -80,8 +94,10 @@ pub struct Painter {
     clouds: Vec<Cloud>,
     strokes: Strokes,
     target: Option<Target>,
-    drawn: Option<Drawn>,
-    /// Counts what was sent, so that a picture with the same numbers but other contents is drawn.
+    surfaces: Option<Surfaces>,
+    marks: Option<Marks>,
+    /// Count what was sent, so that a picture with the same numbers but other contents is drawn.
+    scenes: u64,
     change: u64,
 }
 
@@ -113,11 +129,16 @@ impl Ways {
         let line = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Float32];
         let kind = |vertex: &str, fragment: &str, attributes: &[wgpu::VertexAttribute], stride, depth, blend| {
             let instanced = stride != 36;
-            pipelines.pipeline(&Kind { vertex, fragment, attributes, stride, instanced, depth, blend })
+            let layer = match depth {
+                Depth::Solid => Layer::Noted,
+                _ if instanced => Layer::NotAbove,
+                _ => Layer::Ignored,
+            };
+            pipelines.pipeline(&Kind { vertex, fragment, attributes, stride, instanced, depth, layer, blend })
         };
         let over = Blend::Translucent;
         Self {
-            ground: kind("vs_ground", "fs_ground", &[], 0, Depth::Ignored, over),
+            ground: kind("vs_ground", "fs_ground", &[], 0, Depth::Tested, over),
             solid: kind("vs_surface", "fs_surface", &surface, 36, Depth::Solid, Blend::Opaque),
             glass: kind("vs_surface", "fs_surface", &surface, 36, Depth::Tested, over),
             dots: kind("vs_dot", "fs_dot", &dot, 16, Depth::Tested, over),
@@ -141,7 +162,9 @@ impl Painter {
             clouds: Vec::new(),
             strokes: Strokes::default(),
             target: None,
-            drawn: None,
+            surfaces: None,
+            marks: None,
+            scenes: 0,
             change: 0,
         }
     }
@@ -151,32 +174,39 @@ impl Painter {
         &self.render
     }
 
+    /// How much is spent on a picture.
+    pub fn care(&self) -> Care {
+        self.care
+    }
+
     /// The picture; drawn only if something is not as it was.
-    pub fn paint(&mut self, scene: &Arc<Scene>, overlay: &Overlay, look: &Look<'_>) -> TextureId {
+    pub fn paint(&mut self, scene: &Arc<Scene>, overlay: &Overlay, look: &Look<'_>) -> Pane {
         let size = (look.sight.rect().size() * look.pixels_per_point).round();
         let size = [size.x as u32, size.y as u32];
         let target = match self.target.take() {
             Some(target) if target.size() == size => target,
             old => {
-                self.drawn = None;
+                self.surfaces = None;
                 Target::new(&self.render, size, self.care.samples, old.as_ref())
             }
         };
         self.send(scene, overlay, look.palette);
-        let drawn = Drawn {
-            globals: globals(scene, overlay, look, self.care, target.size()),
+        let surfaces = Surfaces {
+            globals: globals(scene, look, target.size()),
             storeys: storeys(scene, look),
-            layers: look.layers,
             size: target.size(),
-            change: self.change,
+            scene: self.scenes,
         };
-        if self.drawn.as_ref() != Some(&drawn) {
-            self.draw(&target, &drawn, look);
-            self.drawn = Some(drawn);
+        let particles = overlay.clouds.iter().map(|cloud| cloud.particles.len().min(self.care.particles)).sum();
+        let marks = Marks { layers: look.layers, opacity: opacity(particles), change: self.change };
+        let moved = self.surfaces.as_ref() != Some(&surfaces);
+        if moved || self.marks.as_ref() != Some(&marks) {
+            self.draw(&target, &surfaces, &marks, look, moved);
+            (self.surfaces, self.marks) = (Some(surfaces), Some(marks));
         }
-        let id = target.id();
+        let pane = target.pane().clone();
         self.target = Some(target);
-        id
+        pane
     }
 
     /// Sends what is new to the card.
@@ -198,6 +228,7 @@ impl Painter {
             let blocks = uniform(&self.render, "storeys", u64::from(STEP) * count as u64);
             let group = pipelines(&self.render, self.care).group(&self.globals, Some((&blocks, STOREY)));
             self.storeys = Some((count, blocks, group));
+            self.scenes += 1;
         }
         let mut changed = fresh;
         self.clouds.truncate(overlay.clouds.len());
@@ -220,52 +251,93 @@ impl Painter {
             self.strokes = Strokes::new(&self.render, wanted, scene);
             changed = true;
         }
-        self.change += u64::from(changed || self.drawn.is_none());
+        self.change += u64::from(changed);
     }
 
-    fn draw(&self, target: &Target, drawn: &Drawn, look: &Look<'_>) {
+    /// `moved`: the surfaces are not where they were.
+    fn draw(&self, target: &Target, surfaces: &Surfaces, marks: &Marks, look: &Look<'_>, moved: bool) {
         let (Some(scene), Some((_, blocks, group))) = (&self.scene, &self.storeys) else { return };
         let queue = &self.render.queue;
-        queue.write_buffer(&self.globals, 0, bytemuck::cast_slice(&drawn.globals));
-        queue.write_buffer(blocks, 0, bytemuck::cast_slice(&drawn.storeys));
+        let mut globals = surfaces.globals.clone();
+        globals[OPACITY] = marks.opacity;
+        queue.write_buffer(&self.globals, 0, bytemuck::cast_slice(&globals));
+        queue.write_buffer(blocks, 0, bytemuck::cast_slice(&surfaces.storeys));
         let mut encoder = self.render.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut pass = target.pass(&mut encoder, shares(look.palette.background));
-        pass.set_bind_group(0, group, &[0]);
-        pass.set_pipeline(&self.ways.ground);
-        pass.draw(0..4, 0..1);
-        for (index, (storey, opacity)) in scene.scene.storeys().iter().zip(look.opacities).enumerate() {
+        if moved || !target.keeps() {
+            self.building(&mut target.below(&mut encoder, shares(look.palette.background)), scene, group, look);
+        }
+        let mut pass = target.above(&mut encoder);
+        let storeys = look.opacities.iter().enumerate().take(scene.scene.storeys().len());
+        for (index, _) in storeys.filter(|(_, opacity)| opacity.marks > 0.0) {
             pass.set_bind_group(0, group, &[index as u32 * STEP]);
-            for (part, range) in [(opacity.ground, &storey.ground), (opacity.walls, &storey.walls)] {
-                if part > 0.0 && !range.is_empty() {
-                    pass.set_pipeline(if part < 1.0 { &self.ways.glass } else { &self.ways.solid });
-                    pass.set_vertex_buffer(0, scene.vertices.slice(..));
-                    pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
-                    pass.draw_indexed(range.clone(), 0, 0..1);
-                }
-            }
-            if opacity.marks <= 0.0 {
-                continue;
-            }
-            if look.layers.particles {
-                for pipeline in [&self.ways.dots_behind, &self.ways.dots] {
+            pass.set_stencil_reference(layer(index));
+            if marks.layers.particles {
+                let behind = self.care.fine.then_some(&self.ways.dots_behind);
+                for pipeline in behind.into_iter().chain([&self.ways.dots]) {
                     pass.set_pipeline(pipeline);
                     for cloud in &self.clouds {
                         cloud.draw(&mut pass, index);
                     }
                 }
             }
-            self.strokes.draw(&mut pass, index, look.layers, [&self.ways.casing, &self.ways.line]);
+            self.strokes.draw(&mut pass, index, marks.layers, [&self.ways.casing, &self.ways.line]);
         }
         drop(pass);
         queue.submit([encoder.finish()]);
     }
+
+    /// Draws all that particles and ways lie on.
+    fn building(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        scene: &SceneBuffers,
+        group: &wgpu::BindGroup,
+        look: &Look<'_>,
+    ) {
+        let storeys = || scene.scene.storeys().iter().zip(look.opacities).enumerate();
+        let draw = |pass: &mut wgpu::RenderPass<'_>, index: usize, parts: Vec<Range<u32>>| {
+            pass.set_bind_group(0, group, &[index as u32 * STEP]);
+            pass.set_stencil_reference(layer(index));
+            for part in parts {
+                pass.set_vertex_buffer(0, scene.vertices.slice(..));
+                pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
+                pass.draw_indexed(part, 0, 0..1);
+            }
+        };
+        pass.set_pipeline(&self.ways.solid);
+        for (index, (storey, opacity)) in storeys().rev() {
+            draw(pass, index, parts(storey, *opacity, |part| part >= 1.0));
+        }
+        // The ground is below all of it: drawn where there is nothing.
+        pass.set_pipeline(&self.ways.ground);
+        pass.set_stencil_reference(0);
+        pass.set_bind_group(0, group, &[0]);
+        pass.draw(0..4, 0..1);
+        pass.set_pipeline(&self.ways.glass);
+        for (index, (storey, opacity)) in storeys() {
+            draw(pass, index, parts(storey, *opacity, |part| part > 0.0 && part < 1.0));
+        }
+    }
+}
+
+/// The triangles of a floor whose opacity is such.
+fn parts(storey: &Storey, opacity: Opacity, such: impl Fn(f32) -> bool) -> Vec<Range<u32>> {
+    let parts = [(opacity.ground, &storey.ground), (opacity.walls, &storey.walls)];
+    parts.into_iter().filter(|(part, range)| such(*part) && !range.is_empty()).map(|(_, range)| range.clone()).collect()
+}
+
+/// The layer of a floor; of more than can be counted the last ones are one.
+fn layer(storey: usize) -> u32 {
+    storey.saturating_add(1).min(0xff) as u32
+}
+
+/// Of that many particles: where there are many, the plan below them is to be seen too.
+fn opacity(particles: usize) -> f32 {
+    0.85 * (MANY / particles.max(1) as f32).sqrt().clamp(0.25, 1.0)
 }
 
 /// The block that is the same for everything.
-fn globals(scene: &Scene, overlay: &Overlay, look: &Look<'_>, care: Care, size: [u32; 2]) -> Vec<f32> {
-    let particles: usize = overlay.clouds.iter().map(|cloud| cloud.particles.len().min(care.particles)).sum();
-    // Where there are many, the plan below them is to be seen too.
-    let opacity = 0.85 * (MANY / particles.max(1) as f32).sqrt().clamp(0.25, 1.0);
+fn globals(scene: &Scene, look: &Look<'_>, size: [u32; 2]) -> Vec<f32> {
     let [low, high] = scene.bounds();
     let middle = [(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0];
     let camera = look.sight.camera();
@@ -280,7 +352,7 @@ fn globals(scene: &Scene, overlay: &Overlay, look: &Look<'_>, care: Care, size: 
     let ground = scene.datum() - GROUND_M;
     let per_pixel = look.sight.metres_per_pixel(size[1]) as f32;
     numbers.extend([scene.datum() as f32, ground as f32, per_pixel, f32::from(u8::from(flat))]);
-    numbers.extend([look.wall_height_m, opacity, spacing as f32, radius as f32]);
+    numbers.extend([look.wall_height_m, 0.0, spacing as f32, radius as f32]);
     numbers.extend([middle[0] as f32, middle[1] as f32, 0.0, 0.0]);
     let opaque = |rgb| {
         let [red, green, blue] = shares(rgb);

@@ -11,7 +11,7 @@ use super::view::{SPREAD, View};
 use super::{controls, gauges, keys, lettering, pins, pointer};
 use crate::building::Point;
 use crate::window::gpu::{Care, RenderState};
-use eframe::egui::{self, Color32, Rect, Sense, Ui, WidgetInfo, WidgetType, pos2};
+use eframe::egui::{self, Rect, Sense, Ui, WidgetInfo, WidgetType, pos2};
 use std::sync::Arc;
 
 /// Of walls in perspective: cut, so that one sees into rooms. **Units:** m.
@@ -100,6 +100,11 @@ impl Map {
         self.painter.render()
     }
 
+    /// How much is spent on pictures.
+    pub fn care(&self) -> Care {
+        self.painter.care()
+    }
+
     /// Shows all of the building, or all of the walk where there is none.
     pub fn fit(&self, view: &View, scene: &Scene, overlay: &Overlay, rect: Rect) -> Camera {
         let spread = spread(view);
@@ -176,13 +181,11 @@ impl Map {
             opacities: &opacities,
             layers: view.layers,
         };
-        let picture = self.painter.paint(scene, overlay, &look);
-        let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         let painter = ui.painter_at(rect);
-        painter.image(picture, rect, whole, Color32::WHITE);
+        self.painter.paint(scene, overlay, &look).show(&painter, rect);
 
         let scenery = Scenery { scene, overlay, view, sight: &sight, palette, opacities: &opacities, spread };
-        let mut letters = lettering::Letters::new(&painter, palette, rect);
+        let mut letters = lettering::Letters::new(&painter, palette, rect, self.care().fine);
         let pinned = pins::draw(&painter, &mut letters, &scenery, self.picked);
         let told = self.point(&response, &scenery, &pinned);
         self.ruler.draw(&painter, &mut letters, &scenery, told.hovered.as_ref());
