@@ -4,10 +4,12 @@
 //! The default looks at the cells of the map that hold particles: cells that touch belong together, on stairs and in
 //! elevators across floors too. That takes one pass over the particles, whatever their number.
 
-use super::cloud::Particle;
+use super::cloud::{BLOCK, Particle};
 use super::map::Map;
 use super::random::Stream;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Where the person may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,9 +45,10 @@ struct Sums {
     weight: f64,
     count: usize,
     /// Of the offset from the first particle, so that little is lost of the squares.
-    origin: Vector3<f64>,
-    first: Vector3<f64>,
-    second: Matrix3<f64>,
+    origin: [f64; 3],
+    first: [f64; 3],
+    /// Upper triangle, row by row.
+    second: [f64; 6],
     direction: [f64; 2],
     floors: Vec<f64>,
 }
@@ -55,9 +58,9 @@ impl Sums {
         Self {
             weight: 0.0,
             count: 0,
-            origin,
-            first: Vector3::zeros(),
-            second: Matrix3::zeros(),
+            origin: origin.into(),
+            first: [0.0; 3],
+            second: [0.0; 6],
             direction: [0.0; 2],
             floors: vec![0.0; floors],
         }
@@ -65,27 +68,41 @@ impl Sums {
 
     fn add(&mut self, particle: &Particle) {
         let weight = f64::from(particle.weight);
-        let offset = place(particle) - self.origin;
+        let at = [particle.x, particle.y, particle.z];
+        let [x, y, z] = std::array::from_fn(|axis| f64::from(at[axis]) - self.origin[axis]);
+        let weighed = [x * weight, y * weight, z * weight];
         self.weight += weight;
         self.count += 1;
-        self.first += offset * weight;
-        self.second += offset * offset.transpose() * weight;
+        add_all(&mut self.first, &weighed);
+        let [wx, wy, wz] = weighed;
+        add_all(&mut self.second, &[wx * x, wx * y, wx * z, wy * y, wy * z, wz * z]);
         let (sin, cos) = particle.heading.sin_cos();
-        self.direction[0] += weight * f64::from(cos);
-        self.direction[1] += weight * f64::from(sin);
+        add_all(&mut self.direction, &[weight * f64::from(cos), weight * f64::from(sin)]);
         self.floors[usize::from(particle.floor)] += weight;
+    }
+
+    /// Others of the same group, and with the same origin.
+    fn join(&mut self, other: &Self) {
+        self.weight += other.weight;
+        self.count += other.count;
+        add_all(&mut self.first, &other.first);
+        add_all(&mut self.second, &other.second);
+        add_all(&mut self.direction, &other.direction);
+        add_all(&mut self.floors, &other.floors);
     }
 
     /// (5.28 - 5.33), with weights.
     fn finish(self, total: f64, map: &Map) -> Cluster {
-        let mean = self.first / self.weight;
+        let mean = Vector3::from(self.first) / self.weight;
+        let [xx, xy, xz, yy, yz, zz] = self.second;
+        let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let [cos, sin] = self.direction;
         let floor_index =
             (0..self.floors.len()).max_by(|&a, &b| self.floors[a].total_cmp(&self.floors[b])).unwrap_or_default();
         Cluster {
             probability: self.weight / total,
-            position: self.origin + mean,
-            covariance: self.second / self.weight - mean * mean.transpose(),
+            position: Vector3::from(self.origin) + mean,
+            covariance: second / self.weight - mean * mean.transpose(),
             heading: sin.atan2(cos),
             heading_agreement: cos.hypot(sin) / self.weight,
             floor: map.floors[floor_index].number,
@@ -93,6 +110,11 @@ impl Sums {
             count: self.count,
         }
     }
+}
+
+/// Adds to each sum what belongs to it.
+pub(super) fn add_all(sums: &mut [f64], more: &[f64]) {
+    sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
 }
 
 fn place(particle: &Particle) -> Vector3<f64> {
@@ -113,6 +135,8 @@ pub(super) struct Clusters {
     nodes: Vec<u32>,
     /// The cell of each node.
     cells: Vec<usize>,
+    /// The first particle in it.
+    firsts: Vec<u32>,
     /// Union-find over nodes.
     parents: Vec<u32>,
     /// Node of each particle.
@@ -127,11 +151,33 @@ impl Clusters {
         self.mark(particles, map);
         self.join_neighbours(map);
         self.join_layers(particles, map);
+        let roots: Vec<u32> = (0..self.cells.len()).map(|node| find(&mut self.parents, node as u32)).collect();
+        let (all, firsts) = (particles, &self.firsts);
+        let block = |(particles, members): (&[Particle], &[u32])| {
+            let mut groups: Vec<(u32, Sums)> = Vec::new();
+            let mut places: HashMap<u32, usize> = HashMap::new();
+            // Neighbours in the cloud are in the same group nearly always.
+            let mut last = 0;
+            for (particle, &node) in particles.iter().zip(members).filter(|(_, node)| **node != NONE) {
+                let root = roots[node as usize];
+                if groups.get(last).is_none_or(|(known, _)| *known != root) {
+                    last = *places.entry(root).or_insert(groups.len());
+                    if last == groups.len() {
+                        groups.push((root, Sums::new(map.floors.len(), place(&all[firsts[root as usize] as usize]))));
+                    }
+                }
+                groups[last].1.add(particle);
+            }
+            groups
+        };
+        // Collected in order and added in order: the sums do not depend on who was first.
+        let blocks = particles.par_chunks(BLOCK).zip(self.members.par_chunks(BLOCK));
+        let blocks: Vec<Vec<(u32, Sums)>> = blocks.map(block).collect();
         let mut sums: Vec<Option<Sums>> = vec![None; self.cells.len()];
-        for (particle, &node) in particles.iter().zip(&self.members) {
-            if node != NONE && particle.weight > 0.0 {
-                let root = find(&mut self.parents, node) as usize;
-                sums[root].get_or_insert_with(|| Sums::new(map.floors.len(), place(particle))).add(particle);
+        for (root, part) in blocks.into_iter().flatten() {
+            match &mut sums[root as usize] {
+                Some(sum) => sum.join(&part),
+                none => *none = Some(part),
             }
         }
         ranked(sums.into_iter().flatten().map(|sums| sums.finish(total, map)).collect())
@@ -148,8 +194,9 @@ impl Clusters {
         self.nodes.clear();
         self.nodes.resize(cells, NONE);
         self.cells.clear();
+        self.firsts.clear();
         self.members.clear();
-        for particle in particles {
+        for (index, particle) in particles.iter().enumerate() {
             let floor = usize::from(particle.floor);
             let cell = map.floors[floor].grid.cell([particle.x, particle.y]);
             let node = match cell {
@@ -158,6 +205,7 @@ impl Clusters {
                     if *node == NONE {
                         *node = self.cells.len() as u32;
                         self.cells.push(self.offsets[floor] + cell);
+                        self.firsts.push(index as u32);
                     }
                     *node
                 }
@@ -268,7 +316,7 @@ pub(super) fn documented(
             let grown = sums.count > size;
             if grown {
                 size = sums.count;
-                centre += sums.first / sums.weight;
+                centre += Vector3::from(sums.first) / sums.weight;
                 continue;
             }
             if sums.count == 0 {
@@ -327,6 +375,38 @@ mod tests {
         assert_eq!(found(&above).len(), 2);
         let far_in_the_elevator = [at(18.0, 8.0, 0.0, 0), at(18.0, 8.0, 3.6, 1)];
         assert_eq!(found(&far_in_the_elevator).len(), 2);
+    }
+
+    /// More than a block of particles in two places that lie mixed in the cloud: against sums over one place at a time, and on
+    /// several threads.
+    #[test]
+    fn a_cloud_of_many_blocks_is_summed_as_a_whole_on_any_number_of_threads() {
+        let place = |i: usize| if (i / 7).is_multiple_of(3) { [3.0, 3.0] } else { [12.0, 4.0] };
+        let particle = |i: usize| {
+            let ([x, y], along) = (place(i), (i % 100) as f32 * 0.004);
+            Particle { weight: 0.5 + (i % 5) as f32, ..at(x + along, y - 0.5 * along, 0.0, 0) }
+        };
+        let particles: Vec<_> = (0..3 * BLOCK + 100).map(particle).collect();
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| found(&particles))
+        };
+        let clusters = with(1);
+        assert_eq!(clusters, with(3));
+        assert_eq!(clusters.len(), 2);
+        for (cluster, x) in clusters.iter().zip([12.0, 3.0]) {
+            let own: Vec<&Particle> = particles.iter().filter(|particle| (particle.x - x).abs() < 1.0).collect();
+            let sum = |value: &dyn Fn(&Particle) -> f64| -> f64 {
+                own.iter().map(|particle| f64::from(particle.weight) * value(particle)).sum()
+            };
+            let weight = sum(&|_| 1.0);
+            let mean = [sum(&|one| one.x.into()) / weight, sum(&|one| one.y.into()) / weight];
+            let spread = sum(&|one| (f64::from(one.x) - mean[0]) * (f64::from(one.y) - mean[1])) / weight;
+            assert_eq!(cluster.count, own.len());
+            assert!((cluster.position.x - mean[0]).abs() < 1e-9 && (cluster.position.y - mean[1]).abs() < 1e-9);
+            assert!((cluster.covariance[(0, 1)] - spread).abs() < 1e-9, "{} {spread}", cluster.covariance);
+            assert_eq!(cluster.covariance, cluster.covariance.transpose());
+        }
     }
 
     proptest! {

@@ -4,7 +4,7 @@ mod sights;
 
 use super::Error;
 use super::ancestry::{Ancestry, PastPlace};
-use super::cloud::Particle;
+use super::cloud::{BLOCK, Particle};
 use super::cluster::{self, Cluster, Clusters};
 use super::estimate::{Estimate, RoomShare, State};
 use super::map::{ConnectorKind, Map};
@@ -14,6 +14,7 @@ use super::random::{Purpose, Stream};
 use super::resampling;
 use super::start::{self, Patch, Seeded, Start};
 use crate::sight::Sight;
+use rayon::prelude::*;
 use sohle_shared::step::Step;
 use sohle_shared::time::Micros;
 use std::collections::VecDeque;
@@ -466,19 +467,30 @@ impl ParticleFilter {
 
     /// The share of each room, and of stairs and elevators.
     fn rooms(&self, total: f64) -> (Vec<RoomShare>, [f64; 2]) {
-        let mut shares: Vec<Vec<f64>> =
-            self.map.floors.iter().map(|floor| vec![0.0; floor.rooms.outlines().len() + 1]).collect();
-        let mut in_connectors = [0.0; 2];
-        for particle in &self.particles {
-            let floor = &self.map.floors[usize::from(particle.floor)];
-            let point = [particle.x, particle.y];
-            let room = floor.grid.cell(point).and_then(|cell| floor.rooms.at(cell, point));
-            let shares = &mut shares[usize::from(particle.floor)];
-            let place = room.map_or(shares.len() - 1, usize::from);
-            shares[place] += f64::from(particle.weight);
-            if let Some(joint) = self.map.connectors.get(usize::from(particle.connector)) {
-                in_connectors[usize::from(joint.kind == ConnectorKind::Elevator)] += f64::from(particle.weight);
+        let nothing = || -> Vec<Vec<f64>> {
+            self.map.floors.iter().map(|floor| vec![0.0; floor.rooms.outlines().len() + 1]).collect()
+        };
+        let block = |particles: &[Particle]| {
+            let (mut shares, mut in_connectors) = (nothing(), [0.0; 2]);
+            for particle in particles {
+                let floor = &self.map.floors[usize::from(particle.floor)];
+                let point = [particle.x, particle.y];
+                let room = floor.grid.cell(point).and_then(|cell| floor.rooms.at(cell, point));
+                let shares = &mut shares[usize::from(particle.floor)];
+                let place = room.map_or(shares.len() - 1, usize::from);
+                shares[place] += f64::from(particle.weight);
+                if let Some(joint) = self.map.connectors.get(usize::from(particle.connector)) {
+                    in_connectors[usize::from(joint.kind == ConnectorKind::Elevator)] += f64::from(particle.weight);
+                }
             }
+            (shares, in_connectors)
+        };
+        // Collected in order and added in order: the sums do not depend on who was first.
+        let blocks: Vec<(Vec<Vec<f64>>, [f64; 2])> = self.particles.par_chunks(BLOCK).map(block).collect();
+        let (mut shares, mut in_connectors) = (nothing(), [0.0; 2]);
+        for (part, in_part) in &blocks {
+            shares.iter_mut().zip(part).for_each(|(shares, part)| cluster::add_all(shares, part));
+            cluster::add_all(&mut in_connectors, in_part);
         }
         let mut rooms = Vec::new();
         for (floor, shares) in self.map.floors.iter().zip(&shares) {

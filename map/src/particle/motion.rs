@@ -153,8 +153,8 @@ fn within(floors: &[(u16, f32)], z: f32, beyond: f32) -> bool {
 struct Covariance {
     /// x, y, z, turn.
     change: [f32; 4],
-    /// Lower triangle: its product with four independent numbers has the covariance of the step.
-    root: Matrix4<f32>,
+    /// Lower triangle, row by row: its product with four independent numbers has the covariance of the step.
+    root: [[f32; 4]; 4],
     scale_noise: f32,
     leak: f32,
     /// 1 / sigma of what a height may be off: on the level, and where a connector is left.
@@ -179,6 +179,7 @@ impl Covariance {
             || Matrix4::from_diagonal(&covariance.diagonal().map(|value| value.max(0.0).sqrt())),
             |cholesky| cholesky.l(),
         );
+        let root = std::array::from_fn(|row| std::array::from_fn(|column| root[(row, column)]));
         let height = step.covariance[(2, 2)].max(0.0);
         let level = (parameters.level_sigma_m * parameters.level_sigma_m + height).sqrt();
         Self {
@@ -191,10 +192,17 @@ impl Covariance {
         }
     }
 
+    /// Numbers with the covariance of the step.
+    fn correlated(&self, independent: [f32; 4]) -> [f32; 4] {
+        let [a, b, c, d] = independent;
+        let [[aa, ..], [ba, bb, ..], [ca, cb, cc, _], [da, db, dc, dd]] = self.root;
+        [aa * a, ba * a + bb * b, ca * a + cb * b + cc * c, da * a + db * b + dc * c + dd * d]
+    }
+
     fn advance(&self, block: &mut [Particle], map: &Map, stream: &mut Stream) {
         for particle in block {
-            let noise = Vector4::from_fn(|_, _| stream.bell());
-            let noise = self.root * noise;
+            let independent: [f32; 4] = std::array::from_fn(|_| stream.bell());
+            let noise = self.correlated(independent);
             particle.scale = (particle.scale + self.scale_noise * stream.bell()).clamp(0.5, 2.0);
             let dx = self.change[0] * particle.scale + noise[0];
             let dy = self.change[1] * particle.scale + noise[1];

@@ -4,10 +4,14 @@ use super::modes::Shares;
 use crate::building::geometry::{self, Outline, Point};
 use crate::building::{Building, ConnectorKind};
 use crate::particle::Particle;
+use rayon::prelude::*;
 
 /// From one stance of a foot to its next, and what the cloud does not know: nobody's first tread is further away than
 /// this. **Units:** m.
 const STRIDE_M: f64 = 2.0;
+
+/// Particles that a thread takes at a time.
+const BLOCK: usize = 4_096;
 
 /// Outline of a connector on a floor and its surroundings.
 #[derive(Clone, Debug)]
@@ -41,21 +45,34 @@ impl Reach {
 
     /// Where the weight of the particles is.
     pub fn shares(&self, particles: &[Particle]) -> Shares {
-        let (mut total, mut shares) = (0.0, Shares::default());
-        for particle in particles {
-            let weight = f64::from(particle.weight);
-            total += weight;
-            let Some(areas) = self.0.get(usize::from(particle.floor)) else { continue };
-            let point = [particle.x, particle.y].map(f64::from);
-            let inside = areas.iter().find(|area| geometry::contains(&area.outline, point));
-            // On stairs the height is free, and the floor of the particle may have changed before its place does.
-            match inside {
-                Some(area) if area.elevator => shares.elevator += weight,
-                Some(_) => shares.stairs += weight,
-                None => {}
+        let block = |particles: &[Particle]| {
+            let (mut total, mut shares) = (0.0, Shares::default());
+            for particle in particles {
+                let weight = f64::from(particle.weight);
+                total += weight;
+                let Some(areas) = self.0.get(usize::from(particle.floor)) else { continue };
+                let point = [particle.x, particle.y].map(f64::from);
+                let inside = areas.iter().find(|area| area.holds(point));
+                // On stairs the height is free, and the floor of the particle may have changed before its place does.
+                match inside {
+                    Some(area) if area.elevator => shares.elevator += weight,
+                    Some(_) => shares.stairs += weight,
+                    None => {}
+                }
+                let near =
+                    inside.is_some() || particle.is_in_connector() || areas.iter().any(|area| area.is_near(point));
+                shares.near += if near { weight } else { 0.0 };
             }
-            let near = inside.is_some() || particle.is_in_connector() || areas.iter().any(|area| area.is_near(point));
-            shares.near += if near { weight } else { 0.0 };
+            (total, shares)
+        };
+        // Collected in order and added in order: the sums do not depend on who was first.
+        let blocks: Vec<(f64, Shares)> = particles.par_chunks(BLOCK).map(block).collect();
+        let (mut total, mut shares) = (0.0, Shares::default());
+        for (weight, Shares { stairs, elevator, near }) in blocks {
+            total += weight;
+            shares.stairs += stairs;
+            shares.elevator += elevator;
+            shares.near += near;
         }
         if total > 0.0 {
             let Shares { stairs, elevator, near } = shares;
@@ -67,9 +84,16 @@ impl Reach {
 }
 
 impl Area {
+    fn is_around(&self, point: Point) -> bool {
+        (0..2).all(|axis| (self.low[axis]..=self.high[axis]).contains(&point[axis]))
+    }
+
+    fn holds(&self, point: Point) -> bool {
+        self.is_around(point) && geometry::contains(&self.outline, point)
+    }
+
     fn is_near(&self, point: Point) -> bool {
-        let around = (0..2).all(|axis| (self.low[axis]..=self.high[axis]).contains(&point[axis]));
-        around
+        self.is_around(point)
             && geometry::sides(&self.outline)
                 .any(|side| geometry::distance(geometry::nearest(&side, point), point) <= STRIDE_M)
     }
