@@ -98,6 +98,11 @@ impl App {
         &mut self.shoes
     }
 
+    /// Whether there is a graphics card for what is fine.
+    fn is_fine(&self) -> bool {
+        self.map.as_ref().is_none_or(|map| map.care().fine)
+    }
+
     /// How it is laid out.
     pub fn layout(&mut self) -> &mut Layout {
         &mut self.layout
@@ -128,7 +133,7 @@ impl App {
             Look::Light => ThemePreference::Light,
             Look::Dark => ThemePreference::Dark,
         });
-        let fine = self.map.as_ref().is_none_or(|map| map.care().fine);
+        let fine = self.is_fine();
         ui.ctx().tessellation_options_mut(|options| options.feathering = fine);
         let mut commands = Vec::new();
         let snapshot = self.shoes.snapshot().clone();
@@ -171,10 +176,11 @@ impl App {
     }
 
     fn views(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Vec<Command>) {
+        let fine = self.is_fine();
         let Layout { map: map_view, cube, plots, dock, .. } = &mut self.layout;
         let drawing = self.shoes.drawing();
         let mut views = Views {
-            fine: self.map.as_ref().is_none_or(|map| map.care().fine),
+            fine,
             snapshot,
             drawing: &drawing,
             person: None,

@@ -7,25 +7,24 @@ use super::RenderState;
 use eframe::egui::{PaintCallbackInfo, Painter, Rect};
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait};
 use eframe::wgpu;
-use std::sync::Arc;
 
 /// A picture that the window can show; a copy of it is the same picture.
 #[derive(Clone, Debug)]
 pub struct Pane {
-    pipeline: Arc<wgpu::RenderPipeline>,
-    picture: Arc<wgpu::BindGroup>,
+    pipeline: wgpu::RenderPipeline,
+    picture: wgpu::BindGroup,
 }
 
 impl Pane {
     /// Of a picture whose colours are stored as they are shown; `old` is the one that it takes the place of.
     pub fn new(render: &RenderState, picture: &wgpu::TextureView, old: Option<&Self>) -> Self {
-        let pipeline = old.map_or_else(|| Arc::new(pipeline(render)), |old| old.pipeline.clone());
+        let pipeline = old.map_or_else(|| pipeline(render), |old| old.pipeline.clone());
         let picture = render.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("pane"),
             layout: &pipeline.get_bind_group_layout(0),
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(picture) }],
         });
-        Self { pipeline, picture: Arc::new(picture) }
+        Self { pipeline, picture }
     }
 
     /// Shows it. The room must have as many pixels as the picture, and begin with a whole one.
@@ -37,7 +36,7 @@ impl Pane {
 impl CallbackTrait for Pane {
     fn paint(&self, _: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, _: &CallbackResources) {
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &*self.picture, &[]);
+        pass.set_bind_group(0, &self.picture, &[]);
         pass.draw(0..4, 0..1);
     }
 }

@@ -63,7 +63,6 @@ pub struct Look<'a> {
 struct Surfaces {
     globals: Vec<f32>,
     storeys: Vec<f32>,
-    size: [u32; 2],
     /// Which scene it was.
     scene: u64,
 }
@@ -194,7 +193,6 @@ impl Painter {
         let surfaces = Surfaces {
             globals: globals(scene, look, target.size()),
             storeys: storeys(scene, look),
-            size: target.size(),
             scene: self.scenes,
         };
         let particles = overlay.clouds.iter().map(|cloud| cloud.particles.len().min(self.care.particles)).sum();
