@@ -176,6 +176,8 @@ fn run(source: &mut dyn Source, asked: &Receiver<Command>, picture_us: &AtomicU3
                 source.obey(command);
                 asked.try_iter().for_each(|command| source.obey(command));
                 dirty = true;
+                // What came of it is shown, whether the foot stands or not.
+                stands = None;
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return,
@@ -220,12 +222,26 @@ mod tests {
     }
 
     /// Snapshots in about so long, where a picture takes some time; and how long it was.
-    fn published(mut source: Restless, picture: Duration, time: Duration) -> (usize, Duration) {
+    fn published(source: Restless, picture: Duration, time: Duration) -> (usize, Duration) {
+        published_to(source, picture, time, None)
+    }
+
+    /// The same where somebody asks for something every so often.
+    fn published_to(
+        mut source: Restless,
+        picture: Duration,
+        time: Duration,
+        every: Option<Duration>,
+    ) -> (usize, Duration) {
         let (commands, asked) = mpsc::channel();
         let count = Cell::new(0);
         let begun = Instant::now();
         let ends = std::thread::spawn(move || {
-            std::thread::sleep(time);
+            while let Some(every) = every.filter(|_| begun.elapsed() < time) {
+                std::thread::sleep(every);
+                commands.send(Command::Play(true)).unwrap();
+            }
+            std::thread::sleep(time.saturating_sub(begun.elapsed()));
             drop(commands);
         });
         let picture_us = AtomicU32::new(picture.as_micros() as u32);
@@ -257,6 +273,10 @@ mod tests {
         // Who stands for longer is seen again.
         let (long, time) = published(stands(), slow, Duration::from_millis(1_800));
         assert!(long > count || time < STOOD, "{long} {count}");
+        // What somebody asks for is shown.
+        let every = Some(Duration::from_millis(100));
+        let (asked, _) = published_to(stands(), slow, Duration::from_millis(600), every);
+        assert!(asked > count, "{asked} {count}");
         // Where pictures are quick nothing is held back.
         let (quick, time) = published(stands(), Duration::ZERO, Duration::from_millis(600));
         assert!(quick > count, "{quick} {count} in {time:?}");
